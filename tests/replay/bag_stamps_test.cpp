@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
-#include <fstream>
 #include <functional>
 #include <span>
 #include <string>
@@ -25,13 +24,10 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 /// Replays the room drive as a bag.
-Replay replay_bag(const std::vector<RecordedMessage>& messages, RosVersion ros = RosVersion::ros2) {
+Replay replay_bag(const std::vector<RecordedMessage>& messages) {
   const TemporaryFolder folder;
-  const std::string file = folder / (ros == RosVersion::ros2 ? "drive.db3" : "drive.bag");
-  if (ros == RosVersion::ros2)
-    write_db3(file, messages);
-  else
-    std::ofstream{file, std::ios::binary} << ros1_bag(messages);
+  const std::string file = folder / "drive.db3";
+  write_db3(file, messages);
   return Replay({"-c", room_drive() / "config.yaml", "--ground-truth", room_drive() / "gt.tum", file});
 }
 
@@ -50,9 +46,9 @@ std::vector<std::byte> scan_by_driver(std::span<const ReceivedPacket> packets, R
   return scan_message(stamped, ros);
 }
 
-std::vector<RecordedMessage> messages_by_driver(std::function<Stamp(Stamp)> stamps, RosVersion ros = RosVersion::ros2) {
+std::vector<RecordedMessage> messages_by_driver(std::function<Stamp(Stamp)> stamps) {
   driver = std::move(stamps);
-  return messages_of(room_drive(), ros, scan_by_driver);
+  return messages_of(room_drive(), RosVersion::ros2, scan_by_driver);
 }
 
 /// Expects the odometry of the sound bag to 2 mm, sweep for sweep, and one warning that contains `warning`.
@@ -118,36 +114,6 @@ TEST(BagStamps, OfOneClockMatchWhateverTheRecordersClock) {
     for (RecordedMessage& message : messages)
       message.recorded += ahead;
     expect_odometry_of_sound_bag(replay_bag(messages), "");
-  }
-}
-
-/// The clock of the only computer was set: its drivers' and its recorder's. The messages of a database are in the order
-/// of their times, so only another bag shows that the clock was set back.
-TEST(BagStamps, TimesAfterAClockStepContinueFromBefore) {
-  const Stamp start = drive_start();
-  for (const auto& [ros, step] : {std::pair{RosVersion::ros2, Duration{hours{24 * 2000}}},
-                                  {RosVersion::ros1, Duration{hours{1}}},
-                                  {RosVersion::ros1, Duration{-hours{1}}},
-                                  {RosVersion::ros1, Duration{-seconds{30}}}}) {
-    SCOPED_TRACE(to_seconds(step));
-    const auto clock = [=, by = step](Stamp stamp) { return stamp < start + seconds{4} ? stamp : stamp + by; };
-    std::vector<RecordedMessage> messages = messages_by_driver(clock, ros);
-    for (RecordedMessage& message : messages) {
-      const Stamp set = clock(message.recorded);
-      if (!message.topic.ends_with("packets")) { // the stamp follows the encapsulation, or the sequence number
-        const auto set_s = static_cast<std::int32_t>(to_ns(set) / 1'000'000'000);
-        std::memcpy(message.data.data() + 4, &set_s, sizeof(set_s));
-      }
-      message.recorded = set;
-    }
-    const Replay replay = replay_bag(messages, ros);
-    ASSERT_EQ(replay.run().status, 0) << replay.run().err;
-    EXPECT_NE(replay.run().err.find("the clock of the recording computer was set"), std::string::npos)
-        << replay.run().err;
-    EXPECT_EQ(lines_of(replay.run().err).size(), 1U) << replay.run().err;
-    EXPECT_EQ(replay.trajectory().size(), sound_replay().trajectory().size());
-    EXPECT_NEAR(replay.summary()["ape_m"]["max"], sound_replay().summary()["ape_m"]["max"], 0.005);
-    EXPECT_EQ(replay.summary()["packets"]["total"]["clock_steps"], 0);
   }
 }
 

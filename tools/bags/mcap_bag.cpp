@@ -10,16 +10,23 @@
 #include <fmt/format.h>
 
 #include "bags/decompression.hpp"
+#include "bags/reception_order.hpp"
 
 namespace locus::tools {
 namespace {
 
-/// Returns the time of reception of a message; 0 if it is too short.
-std::uint64_t log_time_ns(const McapRecord& message) {
-  MessageReader fields = message.fields();
-  fields.bytes(sizeof(std::uint16_t) + sizeof(std::uint32_t)); // channel and sequence number
-  return fields.number<std::uint64_t>();
-}
+/// Channel and time of reception of a message; 0 if it is too short.
+struct MessageHead {
+  std::uint16_t channel;
+  std::uint64_t log_time_ns;
+
+  static MessageHead of(const McapRecord& message) {
+    MessageReader fields = message.fields();
+    const auto channel = fields.number<std::uint16_t>();
+    fields.bytes(sizeof(std::uint32_t)); // sequence number
+    return {channel, fields.number<std::uint64_t>()};
+  }
+};
 
 } // namespace
 
@@ -211,8 +218,8 @@ void McapBag::accept_channel(const McapRecord& record) {
   declare(channel->id, {channel->topic, type, channel->encoding == "ros1" ? Serialisation::ros1 : Serialisation::cdr});
 }
 
-/// Processes the schemas and channels of a chunk, and sorts its messages by time: writers with several threads store
-/// them as they come.
+/// Processes the schemas and channels of a chunk, and sorts its messages by time, unless the recorder's clock was set
+/// back: writers with several threads store them as they come.
 void McapBag::open_chunk(const McapRecord& record) {
   const McapChunkRecords chunk = unpack_mcap_chunk(record, chunk_);
   if (!chunk.problem.empty())
@@ -220,6 +227,7 @@ void McapBag::open_chunk(const McapRecord& record) {
   records_ = chunk.bytes;
   messages_.clear();
   next_ = 0;
+  ReceptionOrder order;
   for (std::span<const std::byte> left = records_; !left.empty();) {
     const auto offset = static_cast<std::uint32_t>(records_.size() - left.size());
     const std::optional<McapRecord> inner = pop_mcap_record(left);
@@ -227,14 +235,20 @@ void McapBag::open_chunk(const McapRecord& record) {
       leave_out("the records in it are damaged");
       break;
     }
-    if (inner->op == McapOp::message)
-      messages_.push_back(offset);
-    else
+    if (inner->op != McapOp::message) {
       accept(*inner);
+      continue;
+    }
+    messages_.push_back(offset);
+    const auto [channel, log_time_ns] = MessageHead::of(*inner);
+    if (log_time_ns <= static_cast<std::uint64_t>(kMaxBagTime_ns))
+      order.add(channel, static_cast<std::int64_t>(log_time_ns));
   }
+  if (order.is_that_of_the_file())
+    return;
   std::ranges::stable_sort(messages_, {}, [&](std::uint32_t offset) {
     std::span<const std::byte> rest = records_.subspan(offset);
-    return log_time_ns(*pop_mcap_record(rest));
+    return MessageHead::of(*pop_mcap_record(rest)).log_time_ns;
   });
 }
 
@@ -242,7 +256,7 @@ void McapBag::open_chunk(const McapRecord& record) {
 bool McapBag::accept_message(const McapRecord& record) {
   MessageReader fields = record.fields();
   const std::optional<std::size_t> topic = topic_of(fields.number<std::uint16_t>());
-  const std::uint64_t recorded_ns = log_time_ns(record);
+  const std::uint64_t recorded_ns = MessageHead::of(record).log_time_ns;
   fields.bytes(sizeof(std::uint32_t) + 2 * sizeof(std::uint64_t)); // sequence number, times of reception and sending
   const bool has_time = recorded_ns <= static_cast<std::uint64_t>(kMaxBagTime_ns);
   timeless_ += has_time ? 0U : 1U;

@@ -59,7 +59,7 @@ class McapBag : public Bag {
   bool is_over_ = false;    ///< no more records
   std::vector<std::byte> record_, chunk_;
   std::span<const std::byte> records_;  ///< of the current chunk
-  std::vector<std::uint32_t> messages_; ///< offsets in it of its messages, by time
+  std::vector<std::uint32_t> messages_; ///< offsets in it of its messages, in the order of reception
   std::size_t next_ = 0;                ///< index of the next one
   std::map<std::uint16_t, std::string> schemas_;
   BagMessage message_{};

@@ -11,6 +11,7 @@
 #include <sqlite3.h>
 
 #include "bags/decompression.hpp"
+#include "bags/reception_order.hpp"
 
 namespace locus::tools {
 namespace {
@@ -118,11 +119,27 @@ const BagMessage* SqliteBag::next() {
   return nullptr;
 }
 
+/// Returns whether the rows are in the order of reception although their times are not, which players follow. The first
+/// call reads the times of all rows.
+bool SqliteBag::is_in_order_of_rows() {
+  if (!is_in_order_of_rows_) {
+    ReceptionOrder order;
+    const Statement times = prepare("SELECT topic_id, timestamp FROM messages ORDER BY id");
+    while (sqlite3_step(times.get()) == SQLITE_ROW) {
+      const std::int64_t ns = sqlite3_column_int64(times.get(), 1);
+      if (ns >= 0 && ns <= kMaxBagTime_ns)
+        order.add(sqlite3_column_int64(times.get(), 0), ns);
+    }
+    is_in_order_of_rows_ = order.is_that_of_the_file();
+  }
+  return *is_in_order_of_rows_;
+}
+
 /// Steps to the next row; false after the last.
 bool SqliteBag::read_row() {
   if (is_over_)
     return false;
-  if (!rows_) // same order as the players'; without rosbag2's index SQLite would sort all rows including their data
+  if (!rows_ && !is_in_order_of_rows()) // without rosbag2's index SQLite would sort all rows including their data
     rows_ = prepare("SELECT topic_id, timestamp, data FROM messages INDEXED BY timestamp_idx ORDER BY timestamp, id");
   if (!rows_)
     rows_ = prepare("SELECT topic_id, timestamp, data FROM messages ORDER BY id");

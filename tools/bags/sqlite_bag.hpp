@@ -36,11 +36,13 @@ class SqliteBag : public Bag {
   explicit SqliteBag(std::string name) : name_(std::move(name)) {}
   Statement prepare(const char* sql);
   std::optional<std::string> read_topics();
+  bool is_in_order_of_rows();
   bool read_row();
 
   std::string name_;
   std::unique_ptr<sqlite3, Closer> database_;
-  double row_count_ = 0;  ///< largest message number
+  double row_count_ = 0; ///< largest message number
+  std::optional<bool> is_in_order_of_rows_;
   Statement rows_;        ///< declared after the database, to be destroyed first
   std::uint64_t row_ = 0; ///< rows read so far
   bool is_over_ = false;

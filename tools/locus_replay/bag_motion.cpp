@@ -17,7 +17,7 @@ namespace locus::tools {
 namespace {
 
 /// Replaces stamps by arrivals where they cannot be those of a clock: all the same, or of another lag than most by more
-/// than any transit; all of them if most differ. Returns how many.
+/// than any transit; all of them if most differ. Returns how many, except those after whose stamp the clock was set.
 template <class Sample> std::uint64_t replace_wrong_stamps(std::vector<Sample>& samples) {
   constexpr Duration kLongestTransit = std::chrono::seconds{10};
   if (samples.size() < 2)
@@ -35,11 +35,14 @@ template <class Sample> std::uint64_t replace_wrong_stamps(std::vector<Sample>& 
       std::ranges::adjacent_find(samples, std::ranges::not_equal_to{}, &Sample::stamp) == samples.end();
   const bool are_all_wrong = are_constant || 2 * std::ranges::count_if(samples, is_wrong) > std::ssize(samples);
   std::uint64_t replaced = 0;
+  Stamp previous = samples.front().arrival;
   for (Sample& sample : samples) {
+    const bool clock_was_set =
+        std::chrono::abs(sample.arrival - std::exchange(previous, sample.arrival)) > kLongestTransit;
     if (!are_all_wrong && !is_wrong(sample))
       continue;
     sample.stamp = sample.arrival - (are_all_wrong ? Duration{} : usual);
-    ++replaced;
+    replaced += clock_was_set ? 0U : 1U;
   }
   return replaced;
 }

@@ -14,6 +14,7 @@ namespace locus::tools {
 namespace {
 
 constexpr Duration kAhead = std::chrono::milliseconds{500};
+constexpr Duration kLeastBack = std::chrono::milliseconds{20}; ///< less is the disorder of threads
 constexpr std::size_t kWithEach = 100; ///< bytes of overhead per packet or cloud: many may be empty
 
 } // namespace
@@ -41,8 +42,9 @@ const Datagram* BagPackets::next() {
   read_ahead();
   if (scans_.empty())
     return nullptr;
-  const auto set_back = std::ranges::find_if( // by the recorder's clock; what follows is later
-      scans_, [&](const Scan& scan) { return scan.recorded < scans_.front().recorded - kAhead; });
+  const auto set_back = std::find_if( // by the recorder's clock; what follows is later
+      std::next(scans_.begin()), scans_.end(),
+      [&](const Scan& scan) { return scan.clock_was_set_back || scan.recorded < scans_.front().recorded - kAhead; });
   const auto earliest = std::ranges::min_element(scans_.begin(), set_back, {}, &Scan::stamp);
   if (earliest->is_cloud())
     emit_cloud(*earliest);
@@ -100,13 +102,16 @@ void BagPackets::accept(const BagMessage& message) {
     accept_packets(message, *lidar);
 }
 
-void BagPackets::accept_cloud(const BagMessage& message, const Lidar& lidar) {
+void BagPackets::accept_cloud(const BagMessage& message, Lidar& lidar) {
   if (!read_cloud({message.data, bag_->topics()[message.topic].serialisation}, lidar.type)) {
     ++malformed_;
     return;
   }
   waiting_ += message.data.size() + kWithEach;
-  scans_.push_back({&lidar, message.recorded, {}, {message.data.begin(), message.data.end()}});
+  const bool clock_was_set_back = message.recorded <= lidar.latest - kLeastBack;
+  judge_order(message, clock_was_set_back);
+  lidar.latest = message.recorded;
+  scans_.push_back({&lidar, message.recorded, {}, {message.data.begin(), message.data.end()}, clock_was_set_back});
 }
 
 void BagPackets::accept_packets(const BagMessage& message, Lidar& lidar) {
@@ -115,21 +120,29 @@ void BagPackets::accept_packets(const BagMessage& message, Lidar& lidar) {
   malformed_ += packets ? 0U : 1U;
   if (!packets || packets->packets.empty() || !is_of_used_frame(packets->frame, message.recorded, lidar))
     return;
-  judge_order(message, *packets, lidar);
+  const bool lidar_continues = continues(*packets, lidar);
+  judge_order(message, lidar_continues);
   lidar.stamps.correct(*packets, message.recorded);
+  const bool clock_was_set_back = lidar_continues && packets->packets.front().stamp <= lidar.latest - kLeastBack;
+  lidar.latest = packets->packets.back().stamp;
   waiting_ += packets->bytes.size() + kWithEach * packets->packets.size();
-  scans_.push_back({&lidar, message.recorded, *std::move(packets), {}});
+  scans_.push_back({&lidar, message.recorded, *std::move(packets), {}, clock_was_set_back});
 }
 
-/// Decides whether messages are misplaced, or the recorder's clock was set back: then the lidar's clock continues.
-void BagPackets::judge_order(const BagMessage& message, const LidarPackets& packets, Lidar& lidar) {
+/// Returns whether the packets follow those of the lidar's previous message, by its own clock.
+bool BagPackets::continues(const LidarPackets& packets, Lidar& lidar) {
   constexpr Duration kLongestPause = std::chrono::seconds{1};
   const auto first = clock_in(packets.payload(packets.packets.front()), nullptr);
   const Duration advance = first && lidar.clock ? clock_advance(*lidar.clock, *first) : Duration{};
   lidar.clock = clock_in(packets.payload(packets.packets.back()), nullptr);
+  return advance > Duration{} && advance < kLongestPause;
+}
+
+/// Decides whether messages are misplaced, or the recorder's clock was set back, so that this message continues.
+void BagPackets::judge_order(const BagMessage& message, bool message_continues) {
   if (undecided_ == 0)
     return;
-  if (advance > Duration{} && advance < kLongestPause)
+  if (message_continues)
     latest_ = message.recorded;
   else
     misplaced_ += undecided_;

@@ -51,6 +51,7 @@ class BagPackets : public DatagramSource {
     std::uint32_t ip;
     DriverStamps stamps;
     std::optional<Duration> clock{};    ///< of the latest packet, by the lidar (packet_clock.hpp)
+    Stamp latest{};                     ///< of the latest packet; recording time of the latest cloud
     std::optional<std::string> frame{}; ///< frame_id in use
     Stamp frame_seen{};                 ///< recording time of its latest message
     std::string other_frame{};          ///< latest one that was left out
@@ -61,6 +62,7 @@ class BagPackets : public DatagramSource {
     Stamp recorded;
     LidarPackets packets;
     std::vector<std::byte> cloud; ///< message with a cloud; replaces the packets
+    bool clock_was_set_back;      ///< before it
     std::size_t next = 0;         ///< index of the next packet, below their number
 
     [[nodiscard]] bool is_cloud() const { return packets.packets.empty(); }
@@ -69,13 +71,14 @@ class BagPackets : public DatagramSource {
   };
 
   void read_ahead();
-  void judge_order(const BagMessage& message, const LidarPackets& packets, Lidar& lidar);
+  static bool continues(const LidarPackets& packets, Lidar& lidar);
+  void judge_order(const BagMessage& message, bool message_continues);
   void add(std::size_t topic, std::size_t lidar, const LidarOptions& options, std::uint16_t port,
            std::optional<Duration> recorder_ahead);
   void accept(const BagMessage& message);
   void accept_packets(const BagMessage& message, Lidar& lidar);
   static bool is_of_used_frame(const std::string& frame, Stamp recorded, Lidar& lidar);
-  void accept_cloud(const BagMessage& message, const Lidar& lidar);
+  void accept_cloud(const BagMessage& message, Lidar& lidar);
   void emit_packet(const Scan& scan);
   void emit_cloud(Scan& scan);
   void add_warnings_of_topics(std::vector<std::string>& lines) const;

@@ -61,8 +61,9 @@ std::optional<Duration> recorder_ahead_of_driver(Bag& bag, std::size_t topic) {
 }
 
 void DriverStamps::correct(LidarPackets& packets, Stamp recorded) {
+  const Duration since_latest = latest_recorded_ ? recorded - *latest_recorded_ : Duration{};
   const bool clock_was_set = // of all, in the middle of the message
-      latest_recorded_ && std::chrono::abs(recorded - *latest_recorded_) > kLargestError;
+      since_latest < Duration{} || since_latest > kLargestError;
   latest_recorded_ = recorded;
   if (!are_usable(packets, recorded)) {
     replaced_ += has_stamps(packets) && !clock_was_set ? 1U : 0U;

@@ -144,7 +144,7 @@ void McapInputs::add_cloud(const daemon::CloudInput& cloud) {
   }
   const auto count = static_cast<std::uint32_t>(fields.size());
   ros::PointCloud2 message{};
-  message.header_ = {daemon::to_ros(view.stamp), text_of(frame)};
+  message.header_ = {daemon::to_ros(view.stamp - view.ahead), text_of(frame)};
   message.height_ = view.height;
   message.width_ = view.width;
   message.fields_ = {count, count, fields.data(), false};

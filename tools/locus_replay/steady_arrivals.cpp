@@ -18,7 +18,8 @@ constexpr Duration kLongestPause = std::chrono::seconds{1}; ///< between packets
 constexpr Duration kLeastAhead = milliseconds{100};         ///< shorter ones are left to the delay of the network
 constexpr Duration kLeastBack = milliseconds{20};
 constexpr Duration kLookAhead = milliseconds{500};
-constexpr Duration kSpan = milliseconds{500}; ///< of the least lateness
+constexpr Duration kSpan = milliseconds{500};            ///< of the least lateness
+constexpr Duration kLongestGap = std::chrono::hours{24}; ///< between clouds
 constexpr std::size_t kMostStored = 20'000;
 
 bool is_packet(const Datagram& datagram) { return datagram.decoded == nullptr && datagram.cloud == nullptr; }
@@ -64,7 +65,10 @@ const Datagram* SteadyArrivals::next() {
   }
   latest_ = datagram_.receive_stamp;
   datagram_.receive_stamp -= set_by_;
-  follow(datagram_);
+  if (datagram_.cloud != nullptr)
+    pass_cloud();
+  else
+    follow(datagram_);
   return &datagram_;
 }
 
@@ -128,12 +132,37 @@ void SteadyArrivals::look_for_step() {
     const Duration advance = sender != nullptr ? clock_advance(sender->clock, reading->clock) : Duration{};
     if (advance <= Duration{} || advance > kLongestPause)
       continue;
-    if (const auto step = step_from(i, *sender)) {
-      steps_.push_back({sender->arrival + advance, *step});
-      set_by_ += *step;
-    }
+    if (const auto step = step_from(i, *sender))
+      add_step({sender->arrival + advance, *step});
     return;
   }
+}
+
+void SteadyArrivals::add_step(ClockStep step) {
+  steps_.push_back(step);
+  set_by_ += step.by;
+}
+
+/// Removes the steps from the cloud in datagram_, after adding one that it shows. A header that continues when the
+/// arrivals jump has the interval, and otherwise that of the clouds before it is the usual one.
+void SteadyArrivals::pass_cloud() {
+  const auto is_usual = [](Duration interval) { return interval > Duration{} && interval <= kLongestPause; };
+  Clouds& clouds = clouds_[datagram_.lidar];
+  cloud_ = *datagram_.cloud;
+  datagram_.cloud = &cloud_;
+  const Duration interval = datagram_.receive_stamp - clouds.arrival;
+  if (is_usual(interval))
+    clouds.interval = interval;
+  else if (clouds.interval > Duration{} && (interval <= -kLeastBack || interval > kLongestGap)) {
+    const Duration of_headers = cloud_.stamp - clouds.stamp;
+    const Duration expected = is_usual(of_headers) ? of_headers : clouds.interval;
+    datagram_.receive_stamp = clouds.arrival + expected;
+    add_step({datagram_.receive_stamp, interval - expected});
+  }
+  clouds.arrival = datagram_.receive_stamp;
+  clouds.stamp = cloud_.stamp;
+  if (cloud_.stamp != Stamp{})
+    cloud_.ahead = cloud_.stamp - clouds.headers.pass(cloud_.stamp, steps_);
 }
 
 /// Returns the step that a packet shows, together with those of its sender that follow at the same pace.
@@ -172,8 +201,7 @@ std::vector<std::string> SteadyArrivals::warnings() const {
   std::vector<std::string> lines = source_->warnings();
   if (!steps_.empty())
     lines.push_back(fmt::format(
-        "the clock of the recording computer was set {}by {:+.3f} s at {:.3f} s: all times continue from before, by "
-        "the lidar's own clock",
+        "the clock of the recording computer was set {}by {:+.3f} s at {:.3f} s: all times continue from before",
         steps_.size() > 1 ? fmt::format("{} times, first ", steps_.size()) : "", to_seconds(steps_.front().by),
         to_seconds(steps_.front().at.time_since_epoch())));
   return lines;

@@ -4,11 +4,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "drivers/clouds/cloud_view.hpp"
 #include "drivers/lidar_input.hpp"
 #include "drivers/net/datagram.hpp"
 #include "locus_replay/clock_follower.hpp"
@@ -19,8 +21,11 @@ namespace locus::tools {
 ///
 /// The clock was set if packets that follow each other by the lidar's own clock do not by their arrival, and the later
 /// ones arrive at the pace of that clock: a network delays packets, but then they come in a burst, and none comes
-/// before the one that was sent before it. Decoded packets and clouds have no such clock. Reads ahead by half a second
-/// where arrivals jump. Single owner, not thread-safe.
+/// before the one that was sent before it. Reads ahead by half a second where arrivals jump.
+///
+/// Clouds have no such clock, but an interval, and are in order: the clock was set if one arrives before its
+/// predecessor, or more than a day after it. The stamps in their headers continue, too, if they follow the same clock.
+/// Decoded packets pass unchanged. Single owner, not thread-safe.
 class SteadyArrivals : public DatagramSource {
  public:
   /// `lidars` identify the lidar of a datagram.
@@ -57,6 +62,13 @@ class SteadyArrivals : public DatagramSource {
     void restart(Duration at_clock, Stamp at_arrival);
     void follow(Duration at_clock, Stamp at_arrival, Duration advance);
   };
+  /// Clouds of one lidar.
+  struct Clouds {
+    Stamp arrival{};     ///< of the latest, steady
+    Stamp stamp{};       ///< in its header
+    Duration interval{}; ///< usual, between arrivals; zero until known
+    ClockFollower headers{Stamp::max()};
+  };
   /// Time of a data packet by the clock of its sender.
   struct Reading {
     std::uint64_t sender; ///< key
@@ -70,6 +82,8 @@ class SteadyArrivals : public DatagramSource {
   void follow(const Datagram& datagram);
   [[nodiscard]] bool jumps(const Datagram& datagram) const;
   void look_for_step();
+  void add_step(ClockStep step);
+  void pass_cloud();
   [[nodiscard]] std::optional<Duration> step_from(std::size_t first, const Sender& sender);
 
   std::unique_ptr<DatagramSource> source_;
@@ -77,9 +91,11 @@ class SteadyArrivals : public DatagramSource {
   std::deque<Stored> stored_; ///< read ahead
   Stored returned_;
   Datagram datagram_;
+  CloudView cloud_;             ///< of datagram_
   std::optional<Stamp> latest_; ///< arrival of the latest datagram, as recorded
   std::vector<Sender> senders_;
-  Duration set_by_{}; ///< sum of all steps
+  std::map<std::uint8_t, Clouds> clouds_; ///< by lidar
+  Duration set_by_{};                     ///< sum of all steps
   std::vector<ClockStep> steps_;
 };
 
