@@ -41,6 +41,12 @@ class BadCapture : public testing::Test {
   TemporaryFolder folder_;
 };
 
+TEST_F(BadCapture, DescriptionOfABagLeadsToItsFolder) {
+  std::ofstream{folder_ / "metadata.yaml"} << "rosbag2_bagfile_information:\n";
+  expect_error(run_program(LOCUS_REPLAY, {"-o", folder_ / "out", folder_ / "metadata.yaml"}), 1,
+               {"metadata.yaml: describes a bag; name its folder instead: " + folder_.path().string()});
+}
+
 class OutputFolder : public testing::Test {
  protected:
   [[nodiscard]] ProgramRun replay(std::vector<std::string> arguments) const {

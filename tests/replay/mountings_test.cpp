@@ -88,6 +88,18 @@ TEST_F(Mountings, ImuRotationIsReadFromTheStaticTransforms) {
   EXPECT_TRUE(contains(wrong.run().err, "T_base_source")) << "the test's IMU is turned";
 }
 
+TEST_F(Mountings, ImuWithoutAMountingIsReportedUntilItsRotationIsSet) {
+  const std::string unknown = "/tf_static has no mounting of imu (imu_link) on velodyne, so its axes are assumed to be "
+                              "those of velodyne; set it with --set motion_sources.1.T_base_source.rpy_deg=[ROLL,",
+                    bag = bag_with({});
+  const Replay replay({"--duration", "1", bag}), set({"--duration", "1", "--set", kSetTurned, bag});
+  EXPECT_TRUE(contains(replay.run().out, unknown)) << replay.run().out;
+  EXPECT_FALSE(contains(set.run().out, "no mounting of imu")) << set.run().out;
+  EXPECT_TRUE(contains(run_program(LOCUS_REPLAY, {"--discover", bag}).out,
+                       "    T_base_source: {xyz_m: [0, 0, 0], rpy_deg: [0, 0, 0]}  # /tf_static does not connect "
+                       "'imu_link' with velodyne: measure it, above all its rotation\n"));
+}
+
 TEST_F(Mountings, ConfiguredMountingsAreUsed) {
   const std::string set_lidar = "lidars.0.T_base_lidar={xyz_m: [0.3, 0, 0.4], rpy_deg: [0, 0, 10]}";
   const Replay with({"--set", set_lidar, "--set", kSetTurned,

@@ -92,6 +92,8 @@ class Mounting {
 
   void mount(const std::string& sensor, const std::string& frame, const std::optional<Pose>& T_base_sensor,
              const Parts& unset, Pose& mounting, const std::string& key) {
+    if (!T_base_sensor && unset.rotation && !frame.empty())
+      report_unknown(sensor, frame, key);
     if (!T_base_sensor || !unset.any())
       return;
     const Pose T_written = as_written(*T_base_sensor);
@@ -102,6 +104,14 @@ class Mounting {
     reasons_.of_key[key] = fmt::format("{} on {}, by /tf_static", frame, base_);
     lines_.push_back(fmt::format("{}: {} ({}) is mounted at {} on {}, by /tf_static{}", bag_name_, sensor, frame,
                                  text_of(mounting), base_, unset.all() ? "" : " and --set"));
+  }
+
+  void report_unknown(const std::string& sensor, const std::string& frame, const std::string& key) {
+    lines_.push_back(fmt::format("{}: /tf_static has no mounting of {} ({}) on {}, so its axes are assumed to be those "
+                                 "of {}; set it with --set {}.rpy_deg=[ROLL,PITCH,YAW]",
+                                 bag_name_, sensor, frame, base_, base_, key));
+    reasons_.of_key[key] =
+        fmt::format("/tf_static does not connect '{}' with {}: measure it, above all its rotation", frame, base_);
   }
 
   const BagSurvey& survey_;

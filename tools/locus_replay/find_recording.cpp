@@ -74,6 +74,10 @@ FoundRecording find_recording(const std::filesystem::path& named) {
   if (named == "-" && isatty(STDIN_FILENO) == 1)
     throw Failure(ExitStatus::wrong_usage,
                   "-: standard input is a terminal; try: tcpdump -s 0 -w - udp | locus-replay -o out -");
+  if (const std::filesystem::path folder = named.has_parent_path() ? named.parent_path() : ".";
+      named.filename() == "metadata.yaml" && looks_like_bag(folder))
+    throw Failure(ExitStatus::failed,
+                  fmt::format("{}: describes a bag; name its folder instead: {}", named.string(), folder.string()));
   if (std::optional<CaptureFolder> files = files_of(named))
     return {named, *std::move(files), ""};
   const auto inside = captures_in(named).empty() ? recordings_in(named) : std::vector<std::filesystem::path>{};

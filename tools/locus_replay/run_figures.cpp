@@ -93,8 +93,11 @@ std::string readable(const FinishedRun& run) {
   const daemon::SweepFigures& sweeps = figures.sweeps;
   const PacketCounters& packets = figures.ingest.total;
   const auto rejected = std::accumulate(packets.rejected.begin(), packets.rejected.end(), std::uint64_t{0});
-  std::string text = fmt::format("recording  {:.1f} s; packets: {} data, {} position, {} lost, {} rejected\n",
-                                 to_seconds(figures.duration), packets.data, packets.position, packets.lost, rejected);
+  std::string text = fmt::format("recording  {:.1f} s", to_seconds(figures.duration));
+  if (packets.data + packets.position + rejected > 0)
+    text += fmt::format("; packets: {} data, {} position, {} lost, {} rejected", packets.data, packets.position,
+                        packets.lost, rejected);
+  text += '\n';
   for (std::size_t i = 0; i < figures.config.lidars.size(); ++i) {
     const daemon::IngestReport::Lidar& lidar = figures.ingest.lidars[i];
     if (!lidar.model.empty())
