@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A Cyclone DDS participant: cyclone_peer DOMAIN listen|talk|iron|humble|command|flood|mistype|clouds PREFIX; iron and
-// humble print the discovery of nodes and of DDS endpoints. A listener prints `matched TOPIC` once it knows a writer.
-// See peer_words.hpp.
+// A Cyclone DDS participant: cyclone_peer DOMAIN listen|talk|iron|humble|command|flood|mistype|clouds|mount PREFIX;
+// iron and humble print the discovery of nodes and of DDS endpoints. A listener prints `matched TOPIC` once it knows a
+// writer. See peer_words.hpp.
 #include <algorithm>
 #include <array>
 #include <cstdlib>
@@ -229,6 +229,17 @@ void talk_of_clouds(const DdsNode& node) {
   });
 }
 
+/// Publishes once where the lidar of talk_of_clouds() is mounted.
+void mount(const DdsNode& node) {
+  const DdsWriter<ros::TFMessage> transforms{node, "/tf_static", TopicQos::latch()};
+  const daemon::FrameNames frames{"base_link", "lidar"};
+  ros::TransformStamped transform =
+      daemon::to_ros_transform(Stamp{}, {Eigen::Quaterniond::Identity(), {0.1, 0, 0.75}}, frames);
+  if (!transforms.write({{1, 1, &transform, false}}))
+    throw std::runtime_error("DDS did not take a transform");
+  talk_on([](int /*i*/) {});
+}
+
 /// Publishes existing topic names with wrong types.
 void mistype(const DdsNode& node) {
   const DdsWriter<ros::UInt8> imus{node, "/imu/data", {false, 5}}, odometries{node, "/wheel_odometry", {false, 5}};
@@ -240,8 +251,8 @@ void mistype(const DdsNode& node) {
 
 void run(int argc, char** argv) {
   if (argc < 4 || argc > 6)
-    throw std::runtime_error(
-        "usage: cyclone_peer DOMAIN listen|talk|iron|humble|command|flood|mistype|clouds PREFIX [INTERFACE [ENCLAVE]]");
+    throw std::runtime_error("usage: cyclone_peer DOMAIN listen|talk|iron|humble|command|flood|mistype|clouds|mount "
+                             "PREFIX [INTERFACE [ENCLAVE]]");
   DdsOptions options;
   options.domain = std::atoi(argv[1]); // NOLINT
   if (argc >= 5)
@@ -266,6 +277,8 @@ void run(int argc, char** argv) {
     mistype(*node);
   else if (role == "clouds")
     talk_of_clouds(*node);
+  else if (role == "mount")
+    mount(*node);
   else
     listen(*node, argv[3]);
 }

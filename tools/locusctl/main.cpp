@@ -115,6 +115,12 @@ void record(const CtlArguments& arguments) {
   }
 }
 
+void find_sensors(const DdsOptions& dds) {
+  SensorSearch search(dds);
+  search.listen(std::chrono::seconds{2});
+  fmt::print("{}", search.proposal());
+}
+
 /// Parses the arguments to an action; nothing if help or version were requested.
 std::function<void()> parse(int argc, char** argv, CtlArguments& arguments) {
   std::function<void()> action;
@@ -180,7 +186,7 @@ std::function<void()> parse(int argc, char** argv, CtlArguments& arguments) {
   sensors->add_option("--domain", arguments.dds.domain, "Their ROS_DOMAIN_ID; default: 0")
       ->type_name("N")
       ->check(CLI::Range(0, 232));
-  sensors->callback([&] { action = [&] { fmt::print("{}", find_sensors(arguments.dds, std::chrono::seconds{2})); }; });
+  sensors->callback([&] { action = [&] { find_sensors(arguments.dds); }; });
   CLI::App* const from_lidar =
       app.add_subcommand("fetch", "Fetches an Ouster's metadata or a Hesai's angles from the lidar; needs no service");
   from_lidar->add_option("ADDRESS", arguments.address, "Address of the lidar, e.g. 192.168.1.201")->required();

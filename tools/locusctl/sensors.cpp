@@ -13,12 +13,14 @@
 #include "config/config_yaml.hpp"
 #include "discovery/lidar_candidates.hpp"
 #include "drivers/lidar_input.hpp"
-#include "drivers/net/wire_tap.hpp"
 #include "locus_replay/failure.hpp"
-#include "locusctl/live_topics.hpp"
 
 namespace locus::tools {
 namespace {
+
+constexpr std::uint16_t kRoboSensePort = 6699, kSeyondPort = 8010, kLivoxPort = 56301;
+constexpr std::array kDefaultPorts{kDefaultDataPort, kDefaultPositionPort, ouster::kDefaultLidarPort,
+                                   kRoboSensePort,   kSeyondPort,          kLivoxPort};
 
 std::string describe(const SurveyedLidar& lidar) {
   const std::string beams = lidar.beams > 0 ? fmt::format("-{}", lidar.beams) : "";
@@ -137,11 +139,17 @@ class LiveProposal {
   void mount(const MotionCandidate& imu, const StaticTransforms& transforms) {
     const auto source = std::ranges::find(config_.motion_sources, imu.topic, &MotionSource::topic);
     const auto T_base_imu = transforms.between(config_.dds.frame_base, imu.frame);
-    if (imu.kind != SourceKind::imu || source == config_.motion_sources.end() || !T_base_imu)
+    if (imu.kind != SourceKind::imu || source == config_.motion_sources.end())
       return;
+    std::string& reason =
+        reasons_.of_key[fmt::format("motion_sources.{}.T_base_source", source - config_.motion_sources.begin())];
+    if (!T_base_imu) {
+      reason = fmt::format("/tf_static does not place '{}' on {}: measure it, above all its rotation", imu.frame,
+                           config_.dds.frame_base);
+      return;
+    }
     source->T_base_source = as_written(*T_base_imu);
-    reasons_.of_key[fmt::format("motion_sources.{}.T_base_source", source - config_.motion_sources.begin())] =
-        imu.frame == config_.dds.frame_base ? "its frame is the base" : imu.frame + " on the base, by /tf_static";
+    reason = imu.frame == config_.dds.frame_base ? "its frame is the base" : imu.frame + " on the base, by /tf_static";
   }
 
   Config config_;
@@ -150,23 +158,22 @@ class LiveProposal {
 
 } // namespace
 
-std::string find_sensors(const DdsOptions& dds, Duration duration) {
+SensorSearch::SensorSearch(const DdsOptions& dds)
+    : dds_(dds), wire_(value_or_fail(WireTap::open(kDefaultPorts), ExitStatus::failed)),
+      topics_(LiveTopics::join(dds)) {}
+
+void SensorSearch::listen(Duration duration) {
   constexpr Duration kRound = std::chrono::milliseconds{100}; // the readers' history covers more
-  constexpr std::uint16_t kRoboSensePort = 6699, kSeyondPort = 8010, kLivoxPort = 56301;
-  constexpr std::array kDefaultPorts{kDefaultDataPort, kDefaultPositionPort, ouster::kDefaultLidarPort,
-                                     kRoboSensePort,   kSeyondPort,          kLivoxPort};
-  auto wire = WireTap::open(kDefaultPorts);
-  if (!wire)
-    throw Failure(ExitStatus::failed, wire.error());
-  Expected<LiveTopics, std::string> topics = LiveTopics::join(dds);
-  LidarSurvey survey;
-  for (Duration listened{}; listened < duration; listened += kRound) {
-    wire->listen(kRound, [&](const Datagram& datagram) { survey.add(datagram); });
-    if (topics)
-      topics->poll(Stamp{listened + kRound});
+  for (const Duration end = listened_ + duration; listened_ < end; listened_ += kRound) {
+    wire_.listen(kRound, [&](const Datagram& datagram) { survey_.add(datagram); });
+    if (topics_)
+      topics_->poll(Stamp{listened_ + kRound});
   }
+}
+
+std::string SensorSearch::proposal() const {
   std::string text, refused;
-  for (const SurveyedLidar& lidar : survey.lidars()) {
+  for (const SurveyedLidar& lidar : survey_.lidars()) {
     if (lidar.is_known())
       text += describe(lidar);
     if (!lidar.unknown_packets)
@@ -175,19 +182,20 @@ std::string find_sensors(const DdsOptions& dds, Duration duration) {
     text += "# " + describe_unread(lidar);
   }
   LiveProposal proposal;
-  proposal.add_lidars(lidar_candidates(survey, kDefaultDataPort));
-  if (topics)
-    proposal.add_topics(*topics);
+  proposal.add_lidars(lidar_candidates(survey_, kDefaultDataPort));
+  if (topics_)
+    proposal.add_topics(*topics_);
   if (!proposal.has_lidars())
     throw Failure(
         ExitStatus::failed,
-        fmt::format("{}no lidar {}was received within {:.0f} s; check power, cable and the address it sends to",
-                    refused, refused.empty() ? "" : "that can be read ", to_seconds(duration)));
+        fmt::format("{}no lidar {}was received within {:.0f} s; check power, cable and the address it sends to{}",
+                    refused, refused.empty() ? "" : "that can be read ", to_seconds(listened_),
+                    topics_ ? "" : "; no topic of ROS 2 either: " + topics_.error()));
   proposal.reduce_sources(
-      topics ? topics->motion() : std::vector<MotionCandidate>{},
-      topics ? fmt::format("in domain {} on {}; --domain and --interface choose another", dds.domain, dds.interface)
-             : topics.error());
-  proposal.use(dds);
+      topics_ ? topics_->motion() : std::vector<MotionCandidate>{},
+      topics_ ? fmt::format("in domain {} on {}; --domain and --interface choose another", dds_.domain, dds_.interface)
+              : topics_.error());
+  proposal.use(dds_);
   return text + proposal.text();
 }
 
