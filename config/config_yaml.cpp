@@ -355,6 +355,14 @@ Expected<std::string, ConfigErrors> text_of(const std::filesystem::path& file) {
   return text;
 }
 
+/// Recognises a file that was cut while it was written, on a full disk or by a crash. What follows would have its
+/// defaults, and DDS would move to the loopback interface. Such a write ends at a boundary of pages; a complete file
+/// without a line break at its end, which editors may leave out, does so once in thousands.
+bool is_cut(std::string_view text) {
+  constexpr std::size_t kPage = 4096;
+  return text.size() % kPage == 0 && !text.ends_with('\n');
+}
+
 } // namespace
 
 Expected<Config, ConfigErrors> parse_config(const std::string& yaml, const std::string& origin) {
@@ -398,6 +406,12 @@ Expected<Config, ConfigErrors> load_service_config(const std::filesystem::path& 
         error_line(at_line(file.string(), 1),
                    "names no lidar (is the file cut short?); name those of the robot under lidars:, or write "
                    "'defaults: true' for one VLP-16 in the middle of the robot")};
+  if (config && is_cut(*text))
+    return ConfigErrors{
+        error_line(at_line(file.string(), static_cast<int>(split(*text, '\n').size())),
+                   fmt::format("ends within a line after {} bytes, as an interrupted write does: restore "
+                               "the rest, or end this line with a line break if nothing is missing",
+                               text->size()))};
   return config;
 }
 

@@ -19,7 +19,8 @@ using ConfigErrors = std::vector<std::string>;
 Expected<Config, ConfigErrors> load_config(const std::filesystem::path& file);
 
 /// Reads a configuration file for the service: a file without lidars, such as an empty or truncated one, is an error
-/// unless it sets `defaults: true`. Otherwise as load_config().
+/// unless it sets `defaults: true`, and so is one that ends within a line at a multiple of 4096 bytes, as an
+/// interrupted write does. Otherwise as load_config().
 Expected<Config, ConfigErrors> load_service_config(const std::filesystem::path& file);
 
 /// Reads a configuration from text; `origin` replaces the file name in errors. Otherwise as load_config().

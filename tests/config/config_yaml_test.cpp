@@ -440,6 +440,22 @@ TEST(ConfigYaml, ServiceFileMustNameALidarUnlessExempt) {
   EXPECT_FALSE(load_service_config("/nowhere/robot.yaml"));
 }
 
+/// A disk that is full, or a crash, while a file is written: the rest of it would be the defaults.
+TEST(ConfigYaml, ServiceFileCutByAnInterruptedWriteIsRejected) {
+  const auto errors_of_file = [](const std::string& text) {
+    return errors_of(load_service_config(test::TemporaryFile{"robot.yaml", test::bytes_of(text)}.path()));
+  };
+  const std::string lidars = "lidars: [{}]\n", dds = "dds: {interface: wlan0}";
+  const std::string text = lidars + "# " + std::string(4100, 'x') + "\n" + dds;
+  const ConfigErrors errors = errors_of_file(text.substr(0, 4096));
+  ASSERT_EQ(errors.size(), 1U);
+  EXPECT_NE(errors[0].find("robot.yaml:2: ends within a line after 4096 bytes"), std::string::npos) << errors[0];
+  EXPECT_EQ(errors_of_file(text), ConfigErrors{}) << "complete, without a line break at its end";
+  EXPECT_EQ(errors_of_file(lidars + dds), ConfigErrors{});
+  const std::string filler(8192 - lidars.size() - dds.size() - 2, '#');
+  EXPECT_EQ(errors_of_file(lidars + filler + "\n" + dds + "\n"), ConfigErrors{}) << "8192 bytes of whole lines";
+}
+
 TEST(ConfigYaml, AnotherVersionIsAnError) {
   ASSERT_EQ(errors_in("version: 2\n").size(), 1U);
   EXPECT_TRUE(errors_in("version: 2\n")[0].starts_with("robot.yaml:1: version: this locusd reads version 1; see"));
