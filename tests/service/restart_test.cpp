@@ -128,6 +128,29 @@ class RestartWithHeldInput : public RobotNetwork {
   static constexpr Duration kAmid = milliseconds{50}; ///< from the edges of an outage to what happens in it
 };
 
+/// The status of DDS was once updated only as the service's time advances. On a busy computer the publishers were
+/// discovered after its first update, and a test that held the time waited for them in vain.
+TEST_F(RestartWithHeldInput, DiscoversLatePublishersWhileTheTimeStandsStill) {
+  const std::vector<std::string> service = led_locusd(plant() / "config.yaml");
+  const auto has_writers = [](const nlohmann::json& now, int expected) {
+    return std::ranges::all_of(now["sources"], [&](const auto& source) { return source["writers"] == expected; });
+  };
+  daemon_.emplace(service);
+  led_time().hold_at_ns = Duration{seconds{1}}.count();
+  play_.emplace(leading_play({plant().string()}));
+  ASSERT_TRUE(is_held());
+  play_->signal(SIGSTOP);
+  daemon_->signal(SIGKILL);
+  ASSERT_TRUE(daemon_->wait_for_exit());
+  daemon_.emplace(service);
+  ASSERT_TRUE(daemon_->wait_for_line("DDS is up"));
+  listener_.emplace(std::vector<std::string>{CYCLONE_PEER, "0", "listen", "/locus"});
+  ASSERT_TRUE(listener_->wait_for_line("matched odometry"));
+  ASSERT_TRUE(has_writers(status(), 0));
+  play_->signal(SIGCONT);
+  status_when([&](const nlohmann::json& now) { return has_writers(now, 1); });
+}
+
 TEST_F(RestartWithHeldInput, ResumesAtThePoseOfTheRobotAfterStopAndKill) {
   drive_with({{SIGTERM, seconds{5}, milliseconds{5500}}, {SIGKILL, seconds{10}, milliseconds{10500}}});
   EXPECT_GT(heard(*listener_).size(), 120U);
