@@ -41,9 +41,9 @@ RecordedMessage transform(const std::string& parent, const std::string& child, c
 void rename(RecordedMessage& message, std::string_view from, std::string_view to) {
   ASSERT_EQ(from.size(), to.size());
   const auto bytes = std::as_bytes(std::span(from));
-  const auto found = std::ranges::search(message.data, bytes);
-  ASSERT_FALSE(found.empty()) << message.topic;
-  std::memcpy(&*found.begin(), to.data(), to.size());
+  const auto found = std::search(message.data.begin(), message.data.end(), bytes.begin(), bytes.end());
+  ASSERT_NE(found, message.data.end()) << message.topic;
+  std::memcpy(&*found, to.data(), to.size());
 }
 
 class Discover : public testing::Test {

@@ -51,7 +51,7 @@ struct Answer {
 
 /// Returns a sweep at (x, 0, 0) that shows one surface a metre to the left of the robot.
 LiveSweep sweep_at(float x, std::uint64_t sequence, std::int64_t run = 7) {
-  return {run, sequence, {Eigen::Quaterniond::Identity(), {double{x}, 0, 0}}, {{{0, 1, 0}, {0, -1, 0}}}};
+  return {run, sequence, {Eigen::Quaterniond::Identity(), {static_cast<double>(x), 0, 0}}, {{{0, 1, 0}, {0, -1, 0}}}};
 }
 
 TEST(TileMap, VoxelHasOneTile) {
