@@ -358,6 +358,7 @@ Registration Gicp::align(const ElasticScan& source, const SurfaceMap& target, co
   }
   workers_->sum_objects(result);
   result.unknown = workers_->unknown();
+  result.shapeless = few_planes;
   if (result.iterations > 0)
     result.observability = workers_->observability(result.T_target_source.R());
   return result;

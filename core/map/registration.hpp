@@ -43,6 +43,7 @@ inline constexpr std::size_t kObjects = 512; ///< elements of Registration::obje
 struct Registration {
   Pose T_target_source;
   Vector6 twist_base = Vector6::Zero();
+  bool shapeless = false;                  ///< voxels without a plane served as correspondences, too
   bool converged = false;                  ///< the last step was below the thresholds
   int iterations = 0;                      ///< Gauss-Newton steps
   std::size_t points = 0;                  ///< number of points of the scan

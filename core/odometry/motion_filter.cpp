@@ -74,6 +74,10 @@ constexpr double kPlain_sigma = 2.0;
 constexpr double kDegreesOfFreedom = 4.0;
 constexpr double kSlips_per_s = 0.1; ///< rate at which slips begin: prior odds against the likelihood of no slip
 
+/// Standard deviation of the yaw at the end of a sweep within which a turn began: the rate, which is modelled as
+/// constant, changed by some 2 rad/s halfway through.
+constexpr double kTurned_rad = 0.1;
+
 constexpr double kLearns_s = 5.0;      ///< time constant of the learned noise
 constexpr double kPriorWeight_s = 0.5; ///< weight of the prior noise, as a duration
 constexpr double kMostSigmas = 3.0;    ///< innovations are clipped here before the noise is learned from them
@@ -310,6 +314,16 @@ void MotionFilter::couple_lateness(const SpecificForce& force) {
   const Eigen::Vector3d change = force_change(force);
   P_.middleRows<3>(kVelocity) += (change * P_.row(late)).eval();
   P_.middleCols<3>(kVelocity) += (P_.col(late) * change.transpose()).eval();
+}
+
+void MotionFilter::expect_turn(double change_radps, double sigma_radps) {
+  constexpr int kYawRate = kRate + 2;
+  twist_base_[5] += change_radps;
+  P_.row(kYawRate).setZero();
+  P_.col(kYawRate).setZero();
+  P_(kYawRate, kYawRate) = square(sigma_radps);
+  const Eigen::Vector3d up_odom = T_odom_base_.R().col(2);
+  P_.block<3, 3>(kTurn, kTurn) += square(kTurned_rad) * up_odom * up_odom.transpose();
 }
 
 void MotionFilter::expect_rest() {

@@ -99,6 +99,10 @@ class MotionFilter {
   void predict(double elapsed_s, double period_s, const std::optional<SpecificForce>& force, Measured measured,
                const std::optional<Eigen::Vector3d>& sensed_rate = std::nullopt);
 
+  /// Predicts that the rate about the upward axis has changed by `change_radps`, give or take `sigma_radps`. The yaw at
+  /// the end of the last sweep becomes uncertain, too, because the turn may have begun within it. Call before move().
+  void expect_turn(double change_radps, double sigma_radps);
+
   /// Predicts zero velocity (paper II-B.2); the former prediction becomes uncertainty.
   void expect_rest();
 

@@ -181,6 +181,8 @@ void Odometry::apply_sources(MotionFilter& filter, const Sweep& sweep, const Hyp
                    {.translation = true, .rotation = false, .slips = hypothesis.slips});
   if (hypothesis.rests)
     filter.rest();
+  if (hypothesis.turn_radps != 0.0)
+    filter.expect_turn(hypothesis.turn_radps, kTurnSigma_radps);
   if (!rotation && !translation && options_.no_source_prior == NoSourcePrior::identity)
     filter.expect_rest();
   filter.move();
@@ -240,7 +242,8 @@ void Odometry::register_with(const Sweep& sweep, Hypothesis& hypothesis, const G
     match_last(sweep, belief, hypothesis, stop);
   const StageScope scope(clock_, Stage::scan_to_submap);
   const bool wide =
-      !hypothesis.rests && hypothesis.filter.covariance().diagonal().head<3>().maxCoeff() > kWide_m * kWide_m;
+      hypothesis.turn_radps != 0.0 ||
+      (!hypothesis.rests && hypothesis.filter.covariance().diagonal().head<3>().maxCoeff() > kWide_m * kWide_m);
   const Pose T_start = hypothesis.fit.T_target_source;
   hypothesis.fit = gicp_.align(aged_.sort(sweep, scan_, belief.twist_base), map_, T_start, belief, options, wide, stop);
   const Vector6 twist_change = (hypothesis.fit.twist_base - belief.twist_base).cwiseAbs();

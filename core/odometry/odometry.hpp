@@ -81,11 +81,16 @@ class Odometry {
   /// Prior odds, as twice their logarithm, that a source is right in a sweep: it is wrong once in a thousand.
   static constexpr double kSourceIsRight = 13.8;
 
+  /// Changes of the yaw rate that are tried lie this far apart, and standard deviation of the rate about them. A
+  /// registration that searches all voxels around each point finds a rate from 2.4 rad/s away.
+  static constexpr double kTurnStep_radps = 1.2, kTurnSigma_radps = 0.6;
+
   /// An assumption on the motion during a sweep and on the sources that measure it.
   struct Assumption {
     std::bitset<kMaxSources> without{}; ///< excluded sources
     bool rests = false;                 ///< the robot stands
     bool slips = false;                 ///< a slip of the odometry begins
+    double turn_radps = 0.0;            ///< change of the yaw rate, if a turn begins or ends
     bool continues = false;             ///< carried over from the last sweep
   };
 
@@ -157,6 +162,7 @@ class Odometry {
   [[nodiscard]] Rival against(const Hypothesis& best, const Sweep& sweep, Hypothesis other) const;
   [[nodiscard]] bool may_slip(const Sweep& sweep, const SourceChoice& choice) const;
   void continue_rival(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop);
+  void consider_turns(const Sweep& sweep, Hypothesis& best, const Gicp::StopRequested& stop);
   std::optional<Registration> consider_faults(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop);
   [[nodiscard]] bool is_likelier(const Registration& at_rest, const Hypothesis& moving,
                                  std::optional<double> odds_against_stuck) const;

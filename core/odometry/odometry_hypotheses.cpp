@@ -38,6 +38,11 @@ constexpr double kAgrees_m = 0.01;
 /// more slips and costs more registrations (docs/decisions/053).
 constexpr double kSlipsFrom_mps2 = 2.0;
 
+/// Prior odds, as twice their logarithm, that no turn begins or ends in a sweep; largest change of the yaw rate in a
+/// sweep that is considered, in steps: people with a lidar in their hands turn on their heel at 5 rad/s.
+constexpr double kKeepsTurning = 9.2;
+constexpr int kMostTurnSteps = 4;
+
 /// Standard deviation of the shift that moving objects cause in the position of a robot that stands (chosen, not
 /// measured: docs/decisions/054).
 constexpr double kShiftByObjects_m = 0.05;
@@ -207,6 +212,23 @@ std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Contes
   return too_unlikely;
 }
 
+/// Searches from other yaw rates where no source measures the rotation and the fit is unusually bad: a turn that begins
+/// within a sweep takes the points out of reach of their surfaces. Selects the likeliest rate. With lidar alone, what a
+/// motion costs under the prediction says nothing about a turn, so the points decide against the prior odds.
+void Odometry::consider_turns(const Sweep& sweep, Hypothesis& best, const Gicp::StopRequested& stop) {
+  if (best.choice.rotation)
+    return;
+  for (int step = 1; step <= kMostTurnSteps; ++step)
+    for (const double turn_radps : {-step * kTurnStep_radps, step * kTurnStep_radps}) {
+      if (!lidar_health_.is_unusual(best.fit) || stop())
+        return;
+      Hypothesis turn = attempt(sweep, {.without = best.without, .turn_radps = turn_radps}, filter_, stop);
+      const bool comparable = best.fit.shapeless || !turn.fit.shapeless; // voxels without a plane only add points
+      if (comparable && fit_of(turn.fit) > fit_of(best.fit) && evidence(turn.fit, best.fit) > kKeepsTurning)
+        best = std::move(turn);
+    }
+}
+
 /// Tells whether a standstill is likelier than a motion. Where sources measure the motion, the odds are those of the
 /// points, of what the sources measure, and Occam's factor of the motion that a standstill spares.
 bool Odometry::is_likelier(const Registration& at_rest, const Hypothesis& moving,
@@ -265,6 +287,7 @@ Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopReques
     return dead_reckoned(sweep, best);
   Hypothesis first = dead_reckoned(sweep, best);
   const std::optional<Registration> lidar_alone = consider_faults(sweep, contest, stop);
+  consider_turns(sweep, best, stop);
   if (auto rest = consider_rest(sweep, best, stop))
     best = *std::move(rest);
   if (!best.rests && !is_accepted(sweep, lidar_alone.value_or(best.fit), first))

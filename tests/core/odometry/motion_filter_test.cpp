@@ -70,6 +70,24 @@ TEST(MotionFilter, SurpriseIsStudentsTPlusOccamsFactor) {
   EXPECT_NEAR(filter.surprise(found), 10.0 * std::log(1.0 + 1.0 / 4.0), 1e-3);
 }
 
+TEST(MotionFilter, ExpectedTurnChangesTheYawRateAndDoubtsTheYaw) {
+  GaussianRobot robot(winding, {}, 1);
+  MotionFilter as_before = begun_with(robot, winding);
+  as_before.predict(0.1, 0.1, std::nullopt, {});
+  MotionFilter turned = as_before;
+  turned.expect_turn(2.0, 0.5);
+  EXPECT_DOUBLE_EQ(turned.twist_base()[5], as_before.twist_base()[5] + 2.0);
+  EXPECT_EQ(turned.twist_base().head<5>(), as_before.twist_base().head<5>());
+  EXPECT_DOUBLE_EQ(turned.covariance()(11, 11), 0.25);
+  as_before.move();
+  turned.move();
+  const Vector6 apart = difference(turned.pose(), as_before.pose());
+  EXPECT_NEAR(apart.tail<3>().norm(), 0.2, 1e-3) << "2 rad/s for 0.1 s";
+  const Matrix12 more = turned.covariance() - as_before.covariance();
+  EXPECT_GT(more(5, 5), 0.01) << "of the yaw";
+  EXPECT_NEAR(more(3, 3), 0.0, 1e-3) << "of the roll";
+}
+
 // --- Unobserved axes ----------------------------------------------------------------------------------------------
 
 /// Wheels are the only source along x: their own measurements must not change their scale.
