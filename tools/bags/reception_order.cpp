@@ -7,10 +7,9 @@
 namespace locus::tools {
 
 void ReceptionOrder::add(std::int64_t topic, std::int64_t recorded_ns) {
-  constexpr std::int64_t kLeastBack_ns = 20'000'000; ///< less is the disorder of threads
   const auto [found, is_new] = topics_.try_emplace(topic, Topic{recorded_ns});
   Topic& of_topic = found->second;
-  if (std::exchange(of_topic.latest_ns, recorded_ns) - kLeastBack_ns > recorded_ns)
+  if (std::exchange(of_topic.latest_ns, recorded_ns) - kLeastStepBack.count() > recorded_ns)
     most_steps_ = std::max(most_steps_, ++of_topic.steps_back);
 }
 

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <map>
 
 namespace locus::tools {
+
+/// Least step back of the times of a recording that is one of a clock. Less is the disorder of the recorder's threads.
+inline constexpr std::chrono::nanoseconds kLeastStepBack = std::chrono::milliseconds{20};
 
 /// Decides whether messages were received in the order of the file or in that of their times.
 ///

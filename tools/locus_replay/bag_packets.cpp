@@ -8,13 +8,13 @@
 
 #include <fmt/format.h>
 
+#include "bags/reception_order.hpp"
 #include "drivers/packet_clock.hpp"
 
 namespace locus::tools {
 namespace {
 
 constexpr Duration kAhead = std::chrono::milliseconds{500};
-constexpr Duration kLeastBack = std::chrono::milliseconds{20}; ///< less is the disorder of threads
 constexpr std::size_t kWithEach = 100; ///< bytes of overhead per packet or cloud: many may be empty
 
 } // namespace
@@ -108,7 +108,7 @@ void BagPackets::accept_cloud(const BagMessage& message, Lidar& lidar) {
     return;
   }
   waiting_ += message.data.size() + kWithEach;
-  const bool clock_was_set_back = message.recorded <= lidar.latest - kLeastBack;
+  const bool clock_was_set_back = message.recorded <= lidar.latest - kLeastStepBack;
   judge_order(message, clock_was_set_back);
   lidar.latest = message.recorded;
   scans_.push_back({&lidar, message.recorded, {}, {message.data.begin(), message.data.end()}, clock_was_set_back});
@@ -123,7 +123,7 @@ void BagPackets::accept_packets(const BagMessage& message, Lidar& lidar) {
   const bool lidar_continues = continues(*packets, lidar);
   judge_order(message, lidar_continues);
   lidar.stamps.correct(*packets, message.recorded);
-  const bool clock_was_set_back = lidar_continues && packets->packets.front().stamp <= lidar.latest - kLeastBack;
+  const bool clock_was_set_back = lidar_continues && packets->packets.front().stamp <= lidar.latest - kLeastStepBack;
   lidar.latest = packets->packets.back().stamp;
   waiting_ += packets->bytes.size() + kWithEach * packets->packets.size();
   scans_.push_back({&lidar, message.recorded, *std::move(packets), {}, clock_was_set_back});

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "bags/reception_order.hpp"
 #include "drivers/packet_clock.hpp"
 
 namespace locus::tools {
@@ -16,15 +17,14 @@ using std::chrono::milliseconds;
 
 constexpr Duration kLongestPause = std::chrono::seconds{1}; ///< between packets that follow each other
 constexpr Duration kLeastAhead = milliseconds{100};         ///< shorter ones are left to the delay of the network
-constexpr Duration kLeastBack = milliseconds{20};
 constexpr Duration kLookAhead = milliseconds{500};
-constexpr Duration kSpan = milliseconds{500};            ///< of the least lateness
-constexpr Duration kLongestGap = std::chrono::hours{24}; ///< between clouds
+constexpr Duration kSpan = milliseconds{500};              ///< of the least lateness
+constexpr Duration kLongestBreak = std::chrono::hours{24}; ///< between clouds
 constexpr std::size_t kMostStored = 20'000;
 
 bool is_packet(const Datagram& datagram) { return datagram.decoded == nullptr && datagram.cloud == nullptr; }
 
-bool is_step(Duration by) { return by >= kLeastAhead || by <= -kLeastBack; }
+bool is_step(Duration by) { return by >= kLeastAhead || by <= -kLeastStepBack; }
 
 } // namespace
 
@@ -153,7 +153,7 @@ void SteadyArrivals::pass_cloud() {
   const Duration interval = datagram_.receive_stamp - clouds.arrival;
   if (is_usual(interval))
     clouds.interval = interval;
-  else if (clouds.interval > Duration{} && (interval <= -kLeastBack || interval > kLongestGap)) {
+  else if (clouds.interval > Duration{} && (interval <= -kLeastStepBack || interval > kLongestBreak)) {
     const Duration of_headers = cloud_.stamp - clouds.stamp;
     const Duration expected = is_usual(of_headers) ? of_headers : clouds.interval;
     datagram_.receive_stamp = clouds.arrival + expected;
