@@ -21,7 +21,7 @@ struct Link {
   Pose T_parent_child;
 };
 
-const Pose kMast{from_rpy_rad({0, 0, 0.5}), {0.2, 0, 0.6}};
+const Pose kTurnedMast{from_rpy_rad({0, 0, 0.5}), {0.2, 0, 0.6}};
 const Pose kTurned{from_rpy_rad({90 * kRadPerDeg, 0, 0}), {0.1, 0, 0.05}};
 const std::string kSetTurned = "motion_sources.imu.T_base_source={xyz_m: [0.1, 0, 0.05], rpy_deg: [90, 0, 0]}";
 
@@ -103,7 +103,7 @@ TEST_F(Mountings, ImuWithoutAMountingIsReportedUntilItsRotationIsSet) {
 TEST_F(Mountings, ConfiguredMountingsAreUsed) {
   const std::string set_lidar = "lidars.0.T_base_lidar={xyz_m: [0.3, 0, 0.4], rpy_deg: [0, 0, 10]}";
   const Replay with({"--set", set_lidar, "--set", kSetTurned,
-                     bag_with({{"base_link", "velodyne", kMast}, {"base_link", "imu_link", kMast}})});
+                     bag_with({{"base_link", "velodyne", kTurnedMast}, {"base_link", "imu_link", kTurnedMast}})});
   EXPECT_FALSE(contains(output_of(with), "sits")) << with.run().out;
   const Replay without({"--set", set_lidar, "--set", kSetTurned, bag_with({})});
   EXPECT_FALSE(contains(without.run().out, "sits")) << without.run().out;
@@ -113,7 +113,7 @@ TEST_F(Mountings, ConfiguredMountingsAreUsed) {
 TEST_F(Mountings, PartThatIsNotSetIsReadFromTheStaticTransforms) {
   const Replay replay({"--duration", "1", "--set", "lidars.0.T_base_lidar.xyz_m=[0.3, 0, 0.4]", "--set",
                        "motion_sources.imu.T_base_source.rpy_deg=[90, 0, 0]",
-                       bag_with({{"base_link", "velodyne", kMast}, {"base_link", "imu_link", kMast}})});
+                       bag_with({{"base_link", "velodyne", kTurnedMast}, {"base_link", "imu_link", kTurnedMast}})});
   EXPECT_TRUE(contains(replay.run().out, "the lidar (velodyne) is mounted at 0.300 0.000 0.400 m, 0.0 0.0 28.6 deg on "
                                          "base_link, by /tf_static and --set\n"))
       << replay.run().out;
@@ -124,7 +124,7 @@ TEST_F(Mountings, PartThatIsNotSetIsReadFromTheStaticTransforms) {
 
 TEST_F(Mountings, BaseFrameIsTheConfiguredOne) {
   const std::string bag = bag_with(
-      {{"base_link", "mast", kMast}, {"mast", "velodyne", {{1, 0, 0, 0}, {0, 0, 0.1}}}, {"mast", "imu_link", kTurned}});
+      {{"base_link", "mast", kTurnedMast}, {"mast", "velodyne", {{1, 0, 0, 0}, {0, 0, 0.1}}}, {"mast", "imu_link", kTurned}});
   const std::string
       lidar = "the lidar (velodyne) is mounted at 0.000 0.000 0.100 m, 0.0 0.0 0.0 deg on mast, by /tf_static",
       imu = "imu (imu_link) is mounted at 0.100 0.000 0.050 m, 90.0 0.0 0.0 deg on mast, by /tf_static";
@@ -137,7 +137,7 @@ TEST_F(Mountings, BaseFrameIsTheConfiguredOne) {
 }
 
 TEST_F(Mountings, FileSetsTheMountingsThatItNames) {
-  const std::string bag = bag_with({{"base_link", "velodyne", kMast}, {"base_link", "imu_link", kTurned}});
+  const std::string bag = bag_with({{"base_link", "velodyne", kTurnedMast}, {"base_link", "imu_link", kTurned}});
   const Replay lidar({"--duration", "1", "-c", configuration("lidars: [{T_base_lidar: {xyz_m: [0, 0, 0]}}]\n"), bag});
   EXPECT_FALSE(contains(lidar.run().out, "the lidar (velodyne)")) << lidar.run().out;
   EXPECT_TRUE(contains(lidar.run().out, "imu (imu_link) is mounted at 0.100")) << lidar.run().out;
@@ -151,7 +151,7 @@ TEST_F(Mountings, FileSetsTheMountingsThatItNames) {
 
 /// A tree without the base, such as that of a lidar's driver alone.
 TEST_F(Mountings, ImuOfALidarThatIsTheBaseIsMountedOnIt) {
-  const Replay replay({bag_with({{"sensor", "velodyne", kMast}, {"sensor", "imu_link", kMast * kTurned}})});
+  const Replay replay({bag_with({{"sensor", "velodyne", kTurnedMast}, {"sensor", "imu_link", kTurnedMast * kTurned}})});
   EXPECT_TRUE(contains(output_of(replay),
                        "has no mounting of the lidar (velodyne) on base_link, so poses are those of the lidar"));
   EXPECT_TRUE(contains(replay.run().out,
@@ -159,7 +159,7 @@ TEST_F(Mountings, ImuOfALidarThatIsTheBaseIsMountedOnIt) {
                        "by /tf_static\n"))
       << replay.run().out;
   const Replay set({"--duration", "1", "--set", "lidars.0.T_base_lidar={xyz_m: [0, 0, 1], rpy_deg: [0, 0, 90]}",
-                    bag_with({{"sensor", "velodyne", kMast}, {"sensor", "imu_link", kMast * kTurned}})});
+                    bag_with({{"sensor", "velodyne", kTurnedMast}, {"sensor", "imu_link", kTurnedMast * kTurned}})});
   EXPECT_TRUE(
       contains(set.run().out, "imu (imu_link) is mounted at 0.000 0.100 1.050 m, 90.0 0.0 90.0 deg on base_link"))
       << set.run().out;
