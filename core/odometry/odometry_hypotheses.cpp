@@ -54,6 +54,10 @@ bool may_rest(const MotionFilter& prediction) {
   return (prediction.twist_base().array().abs() < kSigmas * sigma.array() + kLeast).all();
 }
 
+/// Tells whether lidar observes the forward motion. Hypotheses on the sources differ in it most; where lidar does not
+/// observe it, points only seem to decide, most of all those of people who walk along.
+bool is_forward_observed(const ObservedAxes& axes) { return axes.each()[0]; }
+
 } // namespace
 
 /// Enters a hypothesis, given how likely it is against the best one.
@@ -131,9 +135,8 @@ Odometry::Rival Odometry::against(const Hypothesis& best, const Sweep& sweep, Hy
 }
 
 /// Continues the rival of the last sweep with what this one adds, unless it has come to agree with the best hypothesis.
-/// Rivals differ in the forward motion most: where lidar does not observe it, points only seem to decide.
 void Odometry::continue_rival(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop) {
-  if (!rival_ || !observed_axes_.each()[0] || stop())
+  if (!rival_ || !is_forward_observed(observed_axes_) || stop())
     return;
   const Assumption assumption{.without = rival_->hypothesis.without | repeating_sources(sweep), .continues = true};
   Rival rival = against(contest.best, sweep, attempt(sweep, assumption, rival_->hypothesis.filter, stop));
@@ -161,15 +164,16 @@ void Odometry::continue_rival(const Sweep& sweep, Contest& contest, const Gicp::
 /// in the last sweep by more than robots usually accelerate, and lidar observes the axis.
 bool Odometry::may_slip(const Sweep& sweep, const SourceChoice& choice) const {
   if (!choice.translation || sources_[index_of(*choice.translation)].kind != SourceKind::odometry ||
-      !observed_axes_.each()[0])
+      !is_forward_observed(observed_axes_))
     return false;
   const double change_mps = steps_.twist_base(sweep, *choice.translation)->mean[0] - filter_.twist_base()[0];
   return std::abs(change_mps) > kSlipsFrom_mps2 * steps_.elapsed_s(sweep);
 }
 
 /// Compares the hypotheses that a slip begins, that one source is wrong, or all are, with the one that none is. Tries
-/// them only if a source contradicts the others or the fit is unusually bad, the slip also if wheels may slip. Returns
-/// the registration without sources if it fits better but the faults it assumes are too unlikely.
+/// them only if a source contradicts the others or the fit is unusually bad, the slip also if wheels may slip, and none
+/// without the source of a forward motion that lidar does not observe. Returns the registration without sources if it
+/// fits better but the faults it assumes are too unlikely.
 std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Contest& contest,
                                                       const Gicp::StopRequested& stop) {
   const Hypothesis& best = contest.best;
@@ -184,7 +188,8 @@ std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Contes
   const auto is_suspect = [&](std::optional<SourceId> source) {
     return contradiction && source && index_of(*source) == contradiction->source;
   };
-  if (may_slip(sweep, best.choice) || is_suspect(best.choice.translation))
+  const bool is_judged = is_forward_observed(observed_axes_);
+  if (may_slip(sweep, best.choice) || (is_judged && is_suspect(best.choice.translation)))
     try_out({.without = repeating, .slips = true});
   if (!contradiction && !is_unusual())
     return std::nullopt;
@@ -195,13 +200,13 @@ std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Contes
     std::swap(suspects[0], suspects[1]);
   for (const std::optional<SourceId>& suspect : suspects) {
     const bool is_explained = (best.slips || (best.without & ~repeating).any()) && !is_unusual();
-    if (!suspect || is_explained || stop())
+    if (!suspect || is_explained || stop() || (!is_judged && suspect == best.choice.translation))
       continue;
     Assumption assumption{.without = repeating};
     assumption.without.set(index_of(*suspect));
     try_out(assumption);
   }
-  if (!is_unusual() || stop() || !(suspects[0] || suspects[1]))
+  if (!is_unusual() || stop() || !(suspects[0] || suspects[1]) || (!is_judged && best.choice.translation))
     return std::nullopt;
   Rival free = against(best, sweep, attempt(sweep, {.without = kAllSources}, filter_, stop));
   const double fits_better = free.lead() + prior_odds(sweep, best) - prior_odds(sweep, free.hypothesis);

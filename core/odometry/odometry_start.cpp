@@ -15,9 +15,11 @@ namespace {
 constexpr double kMinOverlap = 0.3;
 
 constexpr double kUnknownRate_radps = 10.0; ///< standard deviation of an unknown turn rate: a flick of a hand
-constexpr double kBeginsAtRest = 20.0; ///< prior odds, as twice their logarithm, of a stand during the first two sweeps
-constexpr int kRounds = 8;             ///< most iterations until motion and de-skew of the first two sweeps agree
-constexpr double kAgrees = 0.002;      ///< change per iteration below which they agree: metres, radians
+/// Prior odds, as twice their logarithm, of a rest during the first two sweeps: of any drive, and of one that continues
+/// another which ended at rest.
+constexpr double kBeginsAtRest = 9.2, kContinuesAtRest = 20.0;
+constexpr int kRounds = 8;        ///< most iterations until motion and de-skew of the first two sweeps agree
+constexpr double kAgrees = 0.002; ///< change per iteration below which they agree: metres, radians
 
 } // namespace
 
@@ -166,8 +168,8 @@ void Odometry::relocalise_again(const Sweep& first, const Sweep& sweep, const St
 }
 
 /// Returns the motion between the first two sweeps with the sources in `without` excluded from the de-skew. A robot
-/// usually begins at rest. One that was in motion when another run ended is at rest only if the sources that measure a
-/// motion are wrong: along a corridor two sweeps fit equally well.
+/// usually begins at rest, unless the sources measure a motion: along a corridor two sweeps fit either. One that was in
+/// motion when another run ended is at rest only if those sources are wrong.
 Odometry::Start Odometry::start_without(std::bitset<kMaxSources> without, const Sweep& first, const Sweep& sweep,
                                         const Gicp::StopRequested& stop) {
   const MotionFilter unknown = assume(sweep, {.without = without}, filter_).filter;
@@ -197,7 +199,9 @@ Odometry::Start Odometry::start_without(std::bitset<kMaxSources> without, const 
     if (difference(T_odom_base, T_before).cwiseAbs().maxCoeff() < kAgrees || stop())
       break;
   }
-  const double odds_of_rest = continues_motion_ ? -odds_of_sources(sweep, {}) : kBeginsAtRest;
+  const double odds_of_rest = continues_motion_ ? -odds_of_sources(sweep, {})
+                              : start_          ? kContinuesAtRest
+                                                : kBeginsAtRest - unknown.surprise_at_rest();
   if (evidence(rest, start.fit) + odds_against_stuck(repeating_sources(sweep)).value_or(0.0) > -odds_of_rest)
     start = {.without = kAllSources, .rests = true, .twist_base = Vector6::Zero(), .fit = rest};
   return start;
