@@ -177,9 +177,13 @@ class Incident : public RobotNetwork {
     std::filesystem::remove(file("state"));
   }
 
-  /// Waits until the runtime folder has this many data packets.
+  /// Waits until a crash has something to leave: this many data packets in the runtime folder, which the disk thread
+  /// then marks as a run, and a state.
   [[nodiscard]] bool is_stored(std::uint64_t packets) const {
-    return comes_true([&] { return bytes_in(file("run/input-ring")) > packets * velodyne::kDataPacketBytes; });
+    return comes_true([&] {
+      return bytes_in(file("run/input-ring")) > packets * velodyne::kDataPacketBytes &&
+             std::filesystem::exists(file("run/input-ring/run")) && std::filesystem::exists(file("state"));
+    });
   }
 
   /// Kills the service in mid-drive, restarts it, and replays the recording of the crashed process.
