@@ -18,6 +18,8 @@ constexpr double kMaxTilt_deg = 60.0;      ///< no robot starts on a steeper slo
 
 /// Largest turn in a sweep that may be noise of lidar.
 constexpr double kTurns_rad = 0.4 * kRadPerDeg;
+/// Largest part of a turn about one axis that a mounting error of 8 degrees moves to another.
+constexpr double kLeaks = 0.15;
 /// Number of turning sweeps to quarantine a gyro, to use it again, and to judge it.
 constexpr int kSweepsToDoubt = 2, kSweepsToConfirm = 3, kSweepsToJudge = 10;
 constexpr int kRounds = 3; ///< quarantines until it is rejected although the cause is unclear
@@ -149,9 +151,10 @@ std::optional<HealthReason> ImuSelfCheck::on_feedback(LidarOpinion /*opinion*/, 
 void ImuSelfCheck::compare(const RegistrationFeedback& feedback) {
   const Eigen::Vector3d gyro_rad = angle_rad_at(feedback.to) - angle_rad_at(feedback.from);
   const Eigen::Vector3d lidar_rad = to_seconds(feedback.to - feedback.from) * feedback.twist_base.tail<3>();
+  const double noise_rad = std::max(kTurns_rad, kLeaks * std::max(gyro_rad.norm(), lidar_rad.norm()));
   for (std::size_t i = 0; i < turns_.size(); ++i) {
     const auto axis = static_cast<Eigen::Index>(i);
-    const bool turned = std::max(std::abs(gyro_rad[axis]), std::abs(lidar_rad[axis])) > kTurns_rad;
+    const bool turned = std::max(std::abs(gyro_rad[axis]), std::abs(lidar_rad[axis])) > noise_rad;
     if (turned && feedback.observes[3 + i] && !(turns_[i].agree() && turns_[i].sweeps >= kSweepsToJudge))
       turns_[i].add(gyro_rad[axis], lidar_rad[axis]);
   }

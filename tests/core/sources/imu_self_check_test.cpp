@@ -153,6 +153,20 @@ TEST_F(ImuSelfCheckTest, GyroContradictedOnOneAxisIsQuarantinedAfterTwoSweeps) {
   EXPECT_NE(check.verdict().find("other way"), std::string_view::npos);
 }
 
+/// A mounting error of some degrees is for the calibration: fast turns in yaw that it moves to other axes used to
+/// quarantine the gyro, and nothing was calibrated.
+TEST_F(ImuSelfCheckTest, GyroMisalignedByDegreesIsNotQuarantined) {
+  for (const double misaligned_rad : {0.09, -0.09}) {
+    ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
+    for (const double yaw_radps : {0.9, -0.9, 4.0, -4.0}) {
+      turn(check, 10, {0.01 + misaligned_rad * yaw_radps, -misaligned_rad * yaw_radps, yaw_radps},
+           {0.01, 0.0, yaw_radps});
+      EXPECT_FALSE(refused_) << misaligned_rad << " rad, " << yaw_radps << " rad/s";
+    }
+    EXPECT_EQ(check.verdict(), "");
+  }
+}
+
 TEST_F(ImuSelfCheckTest, QuarantinedGyroIsUsedAgainWhenLidarAgrees) {
   ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   stand(check);
