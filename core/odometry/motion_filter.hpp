@@ -1,64 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <optional>
 #include <vector>
 
 #include "core/base/options.hpp"
 #include "core/base/pose.hpp"
 #include "core/map/registration.hpp"
+#include "core/odometry/joint_covariance.hpp"
+#include "core/odometry/learned_source.hpp"
 #include "core/sources/motion_sample.hpp"
 #include "core/sources/registration_feedback.hpp"
 #include "core/sources/sensed_motion.hpp"
 
 namespace locus {
-
-/// Estimate of a calibration parameter, and its standard deviation.
-struct Learned {
-  double mean = 0.0, sigma = 0.0;
-};
-
-/// Calibration and noise of a motion source, for the filter of another run to start with. States: three biases, the
-/// lateness and three mounting angles (rotation vector) of a gyro, or two scales and two directions of an odometry.
-struct LearnedSource {
-  static constexpr int kMostStates = 7;
-  using States = Eigen::Matrix<double, kMostStates, 1>; ///< the first four for an odometry; the rest is zero
-  using Covariance = Eigen::Matrix<double, kMostStates, kMostStates>;
-  static constexpr int kLate = 3, kMounting = 4;  ///< of a gyro, after its biases
-  static constexpr int kScale = 0, kYawScale = 1; ///< of an odometry, with its two directions after them
-
-  Vector6 noise_per_s = Vector6::Zero(); ///< variance of its mean twist over one second
-  States states = States::Zero();
-  Covariance covariance = Covariance::Zero();
-  Stamp since{}; ///< end of the first sweep with a sample of it
-
-  /// Returns the delay of a gyro's stamps after the motion, in seconds.
-  [[nodiscard]] Learned lateness_s() const { return figure(kLate); }
-  /// Returns a gyro's mounting error relative to the configuration, about an axis of the base (0 to 2).
-  [[nodiscard]] Learned mounting_rad(int axis) const { return figure(kMounting + axis); }
-  /// Returns an odometry's relative excess of reported forward distance, and of yaw.
-  [[nodiscard]] Learned scale() const { return figure(kScale); }
-  [[nodiscard]] Learned yaw_scale() const { return figure(kYawScale); }
-  /// Returns the motion of the base for a motion reported by an odometry, with the scale removed. Exact for any path if
-  /// the rotation is right.
-  [[nodiscard]] Pose without_scale(const Pose& way) const;
-
- private:
-  [[nodiscard]] Learned figure(int state) const {
-    return {states[state], std::sqrt(std::max(0.0, covariance(state, state)))};
-  }
-};
-
-/// Returns the prior of a source: its configured calibration and the uncertainty of that.
-LearnedSource as_configured(const MotionSourceOptions& source);
-
-/// Indexed by source; empty for sources that have not been received.
-using LearnedSources = std::array<std::optional<LearnedSource>, kMaxSources>;
 
 /// Error-state Kalman filter on the manifold for the robot and its sensors, with one joint covariance.
 ///
@@ -73,11 +30,7 @@ using LearnedSources = std::array<std::optional<LearnedSource>, kMaxSources>;
 /// type are hypotheses. Fixed size. One owner.
 class MotionFilter {
  public:
-  static constexpr int kCommonStates = 27; ///< common states come before those of the sources
-  static constexpr int kMaxStates = kCommonStates + (LearnedSource::kMostStates + 1) * static_cast<int>(kMaxSources);
-  using State = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxStates, 1>;
-  using Common = Eigen::Matrix<double, kCommonStates, kCommonStates>;
-  using Covariance = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxStates, kMaxStates>;
+  using State = JointCovariance::State;
 
   /// Axes of the twist that a source measures. The process noise for them is replaced by the acceleration limit,
   /// because a robot may brake harder than ever before.
@@ -150,12 +103,14 @@ class MotionFilter {
   [[nodiscard]] const Vector6& twist_base() const { return twist_base_; }
   /// Returns pose and twist with their information as a prior for registration.
   [[nodiscard]] MotionBelief belief() const;
-  [[nodiscard]] Matrix12 covariance() const { return P_.topLeftCorner<12, 12>(); } ///< pose (submap), twist
+  [[nodiscard]] Matrix12 covariance() const { return P_.matrix().topLeftCorner<12, 12>(); } ///< pose (submap), twist
   [[nodiscard]] Matrix6 pose_covariance_since_start() const;
   [[nodiscard]] const State& state() const { return x_; } ///< states after the twist; for tests
   [[nodiscard]] int state_of(SourceId source) const { return sources_[index_of(source)].state; }
 
  private:
+  using Common = JointCovariance::Common;
+
   struct Source {
     SourceKind kind = SourceKind::odometry;
     Eigen::Vector3d lever_m = Eigen::Vector3d::Zero(); ///< from the base to the source, as configured, in base axes
@@ -163,6 +118,7 @@ class MotionFilter {
     LearnedSource::States first, first_variance;       ///< their prior, as configured
     LearnedSource::States fades_per_s;                 ///< rate at which they revert to the prior
     std::optional<int> slip;                           ///< slip state of an odometry; momentary, not learned
+    Vector6 first_noise_per_s;                         ///< prior of the noise
     Vector6 noise_per_s;                               ///< variance of the mean twist over one second
     Vector6 learned_s = Vector6::Zero();
     std::optional<Vector6> last_twist;
@@ -170,6 +126,14 @@ class MotionFilter {
     SensedTwist sensed = Vector6::Zero().eval();
     Vector6 variance = Vector6::Zero();       ///< variance applied; zero along axes that were not used
     Vector6 known_variance = Vector6::Zero(); ///< part of `variance` that is not learned
+
+    [[nodiscard]] int lateness() const { return state + LearnedSource::kLate; }                     ///< of a gyro
+    [[nodiscard]] Block<3> mounting() const { return {state + LearnedSource::kMounting}; }          ///< of a gyro
+    [[nodiscard]] Block<4> lateness_and_mounting() const { return {state + LearnedSource::kLate}; } ///< of a gyro
+    /// Returns the scale of an odometry for the forward speed (axis 0) or the yaw rate (axis 5).
+    [[nodiscard]] int scale(int axis) const {
+      return state + (axis == 0 ? LearnedSource::kScale : LearnedSource::kYawScale);
+    }
   };
 
   /// Prediction of the twist: mean, variance of the noise, and Jacobians of the common states before the noise is added
@@ -178,40 +142,47 @@ class MotionFilter {
     Vector6 mean, variance;
     Common F = Common::Identity(), of_new_rate = Common::Identity();
   };
+  // Process model: motion_filter_process.cpp
   [[nodiscard]] TwistStep decay(double elapsed_s, double step_s, double unmeasured_s, bool force_measured,
                                 Measured measured);
   void integrate(const SpecificForce& force, double measured_s, const Eigen::Vector3d& new_rate, TwistStep& step) const;
   void couple_lateness(const SpecificForce& force);
   [[nodiscard]] Eigen::Vector3d force_change(const SpecificForce& force) const;
+  void limit_speed();
 
+  // Measurements: motion_filter_measurements.cpp
   struct Row { ///< measurement of one axis
     State h;
     double expected;
   };
+  [[nodiscard]] Row gyro_row(const Source& gyro, const SensedTwist& sensed, int axis) const;
+  [[nodiscard]] Row odometry_row(const Source& odometry, int axis) const;
   [[nodiscard]] Row row(const Source& source, const SensedTwist& sensed, int axis) const;
   [[nodiscard]] Vector6 known_variance(const Source& source, const Vector6& twist_base) const;
-  void propagate(const Common& F);
+  double widen(Source& source, int axis, double ratio, double variance);
+  void relinearise_scale(const Source& odometry, int axis, double change);
+
+  // Calibration and noise of the sources: motion_filter_sources.cpp
+  void add_source(const MotionSourceOptions& options, Source& source);
+  void age(const Source& source, double elapsed_s);
+  void revert(int state, double mean, double variance, double retained);
+  void learn_noise(Source& source);
+
+  // Filter: motion_filter.cpp
   void update_scalar(const State& h, double innovation, double variance);
   void correct(const State& error);
-  void lower(const State& Ph, const State& considered, double innovation_variance);
   [[nodiscard]] static State of_map(const State& Ph);
-  void turn_scale(int scale, int axis, double change);
-  void learn_source(Source& source);
-  void age(const Source& source, double elapsed_s);
-  void wander(int state, double mean, double variance, double retained);
   [[nodiscard]] Matrix6 of_mounting() const;
-  void limit_speed();
-  void keep_floor();
 
   MotionLimits limits_;
   Vector6 acceleration_variance_; ///< acceleration variance, (m/s^2)^2 and (rad/s^2)^2
   std::array<Source, kMaxSources> sources_;
   std::size_t count_; ///< number of sources
-  int states_ = kCommonStates;
+  int states_ = JointCovariance::kCommonStates;
   Pose T_odom_start_, T_odom_base_;
   Vector6 twist_base_ = Vector6::Zero();
   State x_; ///< states other than pose and twist; zero at the entries of those
-  Covariance P_;
+  JointCovariance P_;
   double elapsed_s_ = 0.0; ///< time between the ends of the last two sweeps
   std::optional<SpecificForce> last_force_;
   Vector6 predicted_variance_ = Vector6::Zero(); ///< variance of the predicted twist
