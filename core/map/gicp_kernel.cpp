@@ -31,11 +31,12 @@ using Terms = std::array<std::array<float, kChunk>, kTerms>;
 using Lanes = std::array<float, kLanes>;
 using Sums = std::array<Lanes, kTerms>;
 
-/// Computes the terms of a chunk of points from `begin`. The residual of a plane is r = n' (R p + t - mean), its
-/// gradient with respect to the pose g = (n, R p x n). Normals are noisy, and a sum of g g' mistakes their noise for
-/// surfaces of every orientation: along a corridor it would tie the robot to where the scan lines fell. The errors of
-/// the source point's own normal m are independent of n, so a sum of m n' (kSeen) has no such part: the method of
-/// instrumental variables (Reiersol 1941). A shapeless correspondence is a ball.
+/// Eq. 9 and the sums of eq. 10 in docs/estimator.md. Computes the terms of a chunk of points from `begin`. The
+/// residual of a plane is r = n' (R p + t - mean), its gradient with respect to the pose g = (n, R p x n). Normals are
+/// noisy, and a sum of g g' mistakes their noise for surfaces of every orientation: along a corridor it would tie the
+/// robot to where the scan lines fell. The errors of the source point's own normal m are independent of n, so a sum of
+/// m n' (kObserved) has no such part: the method of instrumental variables (Reiersol 1941). A shapeless correspondence
+/// is a ball.
 [[gnu::always_inline]] inline void compute_terms(const Affine& T, const SourceBlock& source, const MatchBlock& match,
                                                  const Axes& axes, float width2, std::size_t begin, Terms& terms) {
   const auto [R, t] = T;

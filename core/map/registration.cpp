@@ -92,7 +92,7 @@ struct ElasticEquations {
   Vector12 b = Vector12::Zero();
   NormalEquations of_pose;
 
-  /// Adds the equations of a block of points that are `age_s` old.
+  /// Eq. 9 in docs/estimator.md. Adds the equations of a block of points that are `age_s` old.
   void add(const NormalEquations& block, double age_s, const Matrix6& R_target_base) {
     of_pose += block;
     if (age_s == 0.0)
@@ -102,6 +102,7 @@ struct ElasticEquations {
     H.bottomRightCorner<6, 6>() -= age_s * R_target_base.transpose() * across;
     b.tail<6>() -= age_s * R_target_base.transpose() * block.b;
   }
+  /// Eq. 10 in docs/estimator.md.
   void complete(const Axes& axes, const Matrix6& R_target_base) {
     H.topLeftCorner<6, 6>() = of_pose.H;
     H.bottomLeftCorner<6, 6>() = H.topRightCorner<6, 6>().transpose();
@@ -251,7 +252,7 @@ Gicp::~Gicp() = default;
 
 namespace {
 
-/// Returns the Gauss-Newton step from `at`.
+/// Eq. 11 in docs/estimator.md. Returns the Gauss-Newton step from `at`.
 Vector12 solve(const ElasticEquations& points, const Registration& at, const MotionBelief& prior) {
   Vector12 from_prior;
   from_prior << difference(at.T_target_source, prior.T_target_source), at.twist_base - prior.twist_base;
@@ -297,11 +298,13 @@ ObjectEvidence weigh_objects(const Registration& one, const Registration& other,
 
 } // namespace
 
+/// Eq. 13 in docs/estimator.md.
 ObjectEvidence compare(const Registration& one, const Registration& other) {
   const ObjectEvidence gained = weigh_objects(one, other, one.mean_error);
   return total(gained) > 0.0 ? gained : weigh_objects(one, other, other.mean_error);
 }
 
+/// E of eq. 13 in docs/estimator.md.
 double total(const ObjectEvidence& evidence) {
   double sum = 0.0;
   for (const float of_object : evidence)

@@ -18,12 +18,14 @@ void JointCovariance::propagate(const Common& F) {
   P_.bottomLeftCorner(own, kCommonStates) = P_.topRightCorner(kCommonStates, own).transpose();
 }
 
+/// Eq. 4 in docs/estimator.md.
 void JointCovariance::revert(int state, double retained, double variance) {
   P_.row(state) *= retained;
   P_.col(state) *= retained;
   P_(state, state) += (1.0 - retained * retained) * variance;
 }
 
+/// Eq. 8 in docs/estimator.md.
 void JointCovariance::condition(const State& Ph, const State& considered, double innovation_variance) {
   P_ -= (Ph * Ph.transpose() - considered * considered.transpose()) / innovation_variance;
   P_ = (0.5 * (P_ + P_.transpose())).eval();

@@ -57,8 +57,8 @@ void MotionFilter::begin(const Pose& T_odom_base, const Vector6& twist_base, con
   elapsed_s_ = 0.0;
 }
 
-/// Applies a scalar measurement. Lateness and mounting of gyros are considered, not corrected: only lidar makes them
-/// observable.
+/// Eq. 8 in docs/estimator.md. Applies a scalar measurement. Lateness and mounting of gyros are considered, not
+/// corrected: only lidar makes them observable.
 void MotionFilter::update_scalar(const State& h, double innovation, double variance) {
   const State Ph = P_.matrix() * h;
   const double innovation_variance = h.dot(Ph) + variance;
@@ -99,6 +99,7 @@ double student_cost(double distance) {
 
 } // namespace
 
+/// D of eq. 13 in docs/estimator.md.
 double MotionFilter::surprise(const Registration& found) const {
   const Matrix12 P = covariance();
   Vector12 moved;
@@ -112,6 +113,7 @@ double MotionFilter::surprise_at_rest() const {
   return student_cost(twist_base_.dot(P.ldlt().solve(twist_base_)));
 }
 
+/// Eq. 12 in docs/estimator.md.
 void MotionFilter::update(const Pose& T_odom_base, const Vector6& twist_base, const Matrix12& information) {
   const Matrix12 P = covariance();
   Vector12 moved;
@@ -133,6 +135,7 @@ void MotionFilter::update(const Pose& T_odom_base, const Vector6& twist_base, co
   twist_base_ = twist_base;
 }
 
+/// Eq. 15 in docs/estimator.md.
 void MotionFilter::transfer_error_to_map(const Matrix6& share) {
   Common transfer = Common::Identity();
   part(transfer, kPose, kPose) -= share;
@@ -141,13 +144,14 @@ void MotionFilter::transfer_error_to_map(const Matrix6& share) {
   P_.raise(kPose, kFloor);
 }
 
+/// P_start of eq. 15 in docs/estimator.md.
 Matrix6 MotionFilter::pose_covariance_since_start() const {
   const Matrix6 both = P_.block(kMap, kPose);
   return P_.block(kPose, kPose) + P_.block(kMap, kMap) + both + both.transpose() + of_mounting();
 }
 
-/// Returns the pose covariance caused by an extrinsics error, relative to the start: error of the first pose minus that
-/// of the last. Considered.
+/// M P_lidar M' of eq. 15 in docs/estimator.md. Returns the pose covariance caused by an extrinsics error, relative to
+/// the start: error of the first pose minus that of the last. Considered.
 Matrix6 MotionFilter::of_mounting() const {
   const Matrix6 error =
       transport(T_odom_base_.translation - T_odom_start_.translation) * turn_both(T_odom_start_.rotation) -

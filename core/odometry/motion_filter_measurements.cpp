@@ -24,7 +24,7 @@ constexpr double kSlips_per_s = 0.1; ///< rate at which slips begin: prior odds 
 
 } // namespace
 
-/// Gyro: w_i + bias_i - lateness dw_i/dt + (w x mounting)_i, and the change by the delay
+/// Gyro, eq. 6 in docs/estimator.md: w_i + bias_i - lateness dw_i/dt + (w x mounting)_i, and the change by the delay
 /// that has been removed. The Jacobian with respect to lateness and mounting excludes what noise explains.
 MotionFilter::Row MotionFilter::gyro_row(const Source& gyro, const SensedTwist& sensed, int axis) const {
   Row row{State::Zero(states_), twist_base_[axis]};
@@ -42,7 +42,8 @@ MotionFilter::Row MotionFilter::gyro_row(const Source& gyro, const SensedTwist& 
   return row;
 }
 
-/// Odometry: (1 + scale) v_x + slip, v_y + leftward v_x, v_z + upward v_x, w_x, w_y, (1 + yaw scale) w_z.
+/// Odometry, eq. 6 in docs/estimator.md: (1 + scale) v_x + slip, v_y + leftward v_x, v_z + upward v_x, w_x, w_y,
+/// (1 + yaw scale) w_z.
 MotionFilter::Row MotionFilter::odometry_row(const Source& odometry, int axis) const {
   Row row{State::Zero(states_), twist_base_[axis]};
   row.h[kTwist.begin + axis] = 1.0;
@@ -69,6 +70,7 @@ MotionFilter::Row MotionFilter::row(const Source& source, const SensedTwist& sen
   return source.kind == SourceKind::imu ? gyro_row(source, sensed, axis) : odometry_row(source, axis);
 }
 
+/// Eq. 7 in docs/estimator.md, V without the learned noise.
 Vector6 MotionFilter::known_variance(const Source& source, const Vector6& twist_base) const {
   const double late_s = source.kind == SourceKind::imu ? kLateGyro_s : kLateOdometry_s;
   const Vector6 limit = elapsed_s_ * acceleration_variance_.cwiseSqrt(); // limit on the change of motion
@@ -78,6 +80,7 @@ Vector6 MotionFilter::known_variance(const Source& source, const Vector6& twist_
   return variance;
 }
 
+/// Eq. 7 in docs/estimator.md, axis by axis.
 void MotionFilter::measure(SourceId id, const SensedTwist& sensed, Measured what) {
   Source& source = sources_[index_of(id)];
   const Vector6& twist_base = sensed.mean;
@@ -98,9 +101,10 @@ void MotionFilter::measure(SourceId id, const SensedTwist& sensed, Measured what
   }
 }
 
-/// Returns the variance of a reading, widened for an outlier as Student's t demands. `ratio`: normalised innovation
-/// squared. An outlier of an odometry's forward speed either lasts one sweep or starts a slip, which is one error for
-/// as long as it lasts: the excess is divided between the reading and the slip by their odds.
+/// Eq. 7 in docs/estimator.md, V+. Returns the variance of a reading, widened for an outlier as Student's t demands.
+/// `ratio`: normalised innovation squared. An outlier of an odometry's forward speed either lasts one sweep or starts a
+/// slip, which is one error for as long as it lasts: the excess is divided between the reading and the slip by their
+/// odds.
 double MotionFilter::widen(Source& source, int axis, double ratio, double variance) {
   const double excess = variance * std::max(0.0, (ratio - 1.0) / (kDegreesOfFreedom + 1.0));
   if (axis != kForward || !source.slip) {
@@ -133,6 +137,7 @@ void MotionFilter::rest() {
 
 double MotionFilter::odds_against_slip() const { return -2.0 * std::log(std::expm1(kSlips_per_s * elapsed_s_)); }
 
+/// Eq. 14 in docs/estimator.md: leave-one-out.
 Innovation MotionFilter::innovation(SourceId id, const SensedTwist& sensed, bool slip_explained) const {
   const Source& source = sources_[index_of(id)];
   const Vector6& twist_base = sensed.mean;

@@ -32,6 +32,7 @@ constexpr double kTurned_rad = 0.1;
 
 } // namespace
 
+/// Eq. 3 in docs/estimator.md, then the random walks and eq. 4.
 void MotionFilter::predict(double elapsed_s, double period_s, const std::optional<SpecificForce>& force,
                            Measured measured, const std::optional<Eigen::Vector3d>& sensed_rate) {
   const double step_s = elapsed_s_ > 0.0 ? 0.5 * (elapsed_s + elapsed_s_) : elapsed_s; // between sweep centres
@@ -56,8 +57,8 @@ void MotionFilter::predict(double elapsed_s, double period_s, const std::optiona
   elapsed_s_ = elapsed_s;
 }
 
-/// Predicts the twist without specific force: axes that no source measures decay to rest. With specific force the
-/// velocity decays only over the time that the force does not cover.
+/// Eq. 1 in docs/estimator.md. Predicts the twist without specific force: axes that no source measures decay to rest.
+/// With specific force the velocity decays only over the time that the force does not cover.
 MotionFilter::TwistStep MotionFilter::decay(double elapsed_s, double step_s, double unmeasured_s, bool force_measured,
                                             Measured measured) {
   TwistStep step;
@@ -79,8 +80,8 @@ MotionFilter::TwistStep MotionFilter::decay(double elapsed_s, double step_s, dou
   return step;
 }
 
-/// Integrates the specific force. Late stamps and a lever arm are states, not noise, because their effects on the
-/// velocity telescope.
+/// Eq. 2 and the Jacobians of eq. 3 in docs/estimator.md. Integrates the specific force. Late stamps and a lever arm
+/// are states, not noise, because their effects on the velocity telescope.
 void MotionFilter::integrate(const SpecificForce& force, double measured_s, const Eigen::Vector3d& new_rate,
                              TwistStep& step) const {
   const Source& source = sources_[index_of(force.source)];
@@ -114,7 +115,8 @@ Eigen::Vector3d MotionFilter::force_change(const SpecificForce& force) const {
   return force.mean_base_mps2() - last_force_.value_or(force).mean_base_mps2();
 }
 
-/// Couples the velocity with the lateness: the velocity error is the lateness times the change of the specific force.
+/// H of eq. 3 in docs/estimator.md. Couples the velocity with the lateness: the velocity error is the lateness times
+/// the change of the specific force.
 void MotionFilter::couple_lateness(const SpecificForce& force) {
   P_.couple(kVelocity, force_change(force), sources_[index_of(force.source)].lateness());
 }
@@ -146,7 +148,7 @@ void MotionFilter::limit_speed() {
   P_.add_covariance(kVelocity, reduction * reduction.transpose());
 }
 
-/// Integrates the twist, constant in base axes, to the pose.
+/// Eq. 5 in docs/estimator.md. Integrates the twist, constant in base axes, to the pose.
 void MotionFilter::move() {
   limit_speed();
   const Pose T_odom_last = T_odom_base_;

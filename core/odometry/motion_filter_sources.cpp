@@ -95,8 +95,8 @@ void MotionFilter::age(const Source& source, double elapsed_s) {
     revert(*source.slip, 0.0, square(kSlip_mps), std::exp(-elapsed_s / kSlipLasts_s));
 }
 
-/// Propagates a state that reverts to a mean (Ornstein-Uhlenbeck process); `retained` is the factor by which its
-/// deviation decays.
+/// Eq. 4 in docs/estimator.md. Propagates a state that reverts to a mean (Ornstein-Uhlenbeck process); `retained` is
+/// the factor by which its deviation decays.
 void MotionFilter::revert(int state, double mean, double variance, double retained) {
   x_[state] = mean + retained * (x_[state] - mean);
   P_.revert(state, retained, variance);
@@ -118,8 +118,8 @@ void MotionFilter::learn() {
 
 namespace {
 
-/// Moves a variance towards the one that an innovation implies. `others`: variance of the estimate from all other
-/// sources.
+/// Eq. 14 in docs/estimator.md. Moves a variance towards the one that an innovation implies. `others`: variance of the
+/// estimate from all other sources.
 void learn_variance(double& variance, double& learned_s, double innovation, double known, double others, double per,
                     double elapsed_s, double least) {
   const double expected = variance * per + known;

@@ -28,10 +28,10 @@ constexpr double kPlainlyLate_sigma = 3.0, kPlainlyLate_s = 0.001, kMostLate_s =
 /// Elapsed time, in sweep lengths, above which sweeps were dropped in between.
 constexpr double kDropped = 1.5;
 
-/// Returns the fraction of the future registration target contributed by this keyframe. If a share s of its surfaces is
-/// new, 2/s - 1 sweeps are visible at a time, and a step in the mean over that many shifts it by 2s/(1 + s) of the step
-/// in the long run. Along axes that no surface constrains the fraction is 1, since older surfaces do not hold the
-/// target.
+/// Share of eq. 15 in docs/estimator.md. Returns the fraction of the future registration target contributed by this
+/// keyframe. If a share s of its surfaces is new, 2/s - 1 sweeps are visible at a time, and a step in the mean over
+/// that many shifts it by 2s/(1 + s) of the step in the long run. Along axes that no surface constrains the fraction is
+/// 1, since older surfaces do not hold the target.
 Matrix6 share_of_map(double fresh, const Matrix6& observability) {
   const Matrix6 all = Matrix6::Identity();
   const Matrix6 constrained = observability / ObservedAxes::kWeakBelow;

@@ -90,7 +90,8 @@ double Odometry::odds_of_sources(const Sweep& sweep, std::bitset<kMaxSources> wi
   return kSourceIsRight * sources;
 }
 
-/// Returns the prior odds of a hypothesis. A fault that continues is no less likely than none.
+/// O of eq. 13 in docs/estimator.md. Returns the prior odds of a hypothesis. A fault that continues is no less likely
+/// than none.
 double Odometry::prior_odds(const Sweep& sweep, const Hypothesis& hypothesis) const {
   return odds_of_sources(sweep, hypothesis.continues ? repeating_sources(sweep) : hypothesis.without) -
          (hypothesis.slips ? hypothesis.filter.odds_against_slip() : 0.0);
@@ -126,7 +127,8 @@ std::optional<double> Odometry::odds_against_stuck(std::bitset<kMaxSources> repe
   return odds;
 }
 
-/// Compares a hypothesis with the best one: by the likelihood of the points, of the motion, and the prior odds.
+/// Eq. 13 in docs/estimator.md. Compares a hypothesis with the best one: by the likelihood of the points, of the
+/// motion, and the prior odds.
 Odometry::Rival Odometry::against(const Hypothesis& best, const Sweep& sweep, Hypothesis other) const {
   const double odds = best.filter.surprise(best.fit) - other.filter.surprise(other.fit) + prior_odds(sweep, other) -
                       prior_odds(sweep, best);
