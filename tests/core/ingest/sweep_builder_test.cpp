@@ -1,111 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
+// Windows of the sweeps, and the returns in them.
 #include "core/ingest/sweep_builder.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
+#include <map>
 #include <tuple>
 #include <utility>
 #include <vector>
 
-namespace locus {
+#include "core/ingest/numbered_lidar.hpp"
+
+namespace locus::test {
 namespace {
 
-using std::chrono::hours;
-using std::chrono::microseconds;
 using std::chrono::milliseconds;
 using std::chrono::nanoseconds;
 using std::chrono::seconds;
-
-constexpr Stamp kStart = stamp_from_ns(1'700'000'000'000'000'000);
-constexpr Duration kColumn = nanoseconds{55'296};
-constexpr Duration kLaser = nanoseconds{2'304};
-constexpr int kColumns = 24;
-constexpr Duration kPacket = kColumns * kColumn;
-constexpr std::size_t kMaxReturns = 60'000; ///< upper bound of two lidars at 300 rpm
-
-/// A lidar with identifiable returns: x is the return's number. Records the firing time of each.
-class NumberedLidar {
- public:
-  explicit NumberedLidar(std::uint8_t index = 0, double rpm = 600, double first_azimuth_deg = 0, Stamp start = kStart)
-      : index_(index), rpm_(rpm), azimuth_deg_(first_azimuth_deg), next_(start) {}
-
-  LidarPacket packet() {
-    LidarPacket packet;
-    packet.lidar = index_;
-    packet.stamp = next_;
-    packet.duration = kPacket;
-    packet.first_azimuth_cdeg = azimuth_cdeg(Duration{0});
-    for (int column = 0; column < kColumns; ++column) {
-      FiringGroup& group = packet.storage[packet.count++];
-      group.y_m = group.z_m = {};
-      group.range_m.fill(range_m_);
-      group.intensity.fill(10);
-      for (std::size_t laser = 0; laser < FiringGroup::kLasers; ++laser) {
-        const Duration offset = column * kColumn + static_cast<int>(laser) * kLaser;
-        group.x_m[laser] = static_cast<float>(fired_.size());
-        group.offset_ns[laser] = static_cast<std::int32_t>(offset.count());
-        group.ring[laser] = static_cast<std::uint8_t>(laser);
-        fired_.push_back(next_ + offset);
-      }
-    }
-    skip(kPacket);
-    return packet;
-  }
-
-  void skip(Duration time) {
-    azimuth_deg_ = std::fmod(azimuth_deg_ + 6.0 * rpm_ * to_seconds(time), 360.0);
-    next_ += time;
-  }
-  void jump(Duration by) { next_ += by; } ///< steps only this lidar's clock
-  void set_range_m(float range_m) { range_m_ = range_m; }
-
-  [[nodiscard]] Stamp next() const { return next_; }
-  [[nodiscard]] Stamp fired(std::size_t number) const { return fired_[number]; }
-  [[nodiscard]] std::size_t count() const { return fired_.size(); }
-
- private:
-  [[nodiscard]] std::uint16_t azimuth_cdeg(Duration since_packet) const {
-    const double turned_deg = azimuth_deg_ + 6.0 * rpm_ * to_seconds(since_packet);
-    return static_cast<std::uint16_t>(static_cast<int>(100.0 * turned_deg) % 36000);
-  }
-
-  std::uint8_t index_;
-  double rpm_;
-  double azimuth_deg_;
-  float range_m_ = 5.0F;
-  Stamp next_;
-  std::vector<Stamp> fired_;
-};
-
-SweepOptions keep_all() {
-  SweepOptions options;
-  options.segment_filter.enabled = false;
-  return options;
-}
-
-/// A builder that stores its sweeps.
-class Built {
- public:
-  explicit Built(const SweepOptions& options = keep_all(), std::size_t lidars = 1,
-                 const std::vector<MotionSourceOptions>& sources = {}, std::size_t max_returns = kMaxReturns)
-      : builder(options, std::vector<Pose>(lidars), MotionSources(sources, Fusion::combined), max_returns,
-                [this](Sweep& sweep) { sweeps.push_back(sweep); }) {}
-
-  void add(const LidarPacket& packet) { builder.add(packet, packet.stamp + packet.duration); }
-  void play(NumberedLidar& lidar, Duration duration) {
-    for (const Stamp end = lidar.next() + duration; lidar.next() < end;)
-      add(lidar.packet());
-  }
-
-  std::vector<Sweep> sweeps;
-  SweepBuilder builder;
-};
-
-std::size_t number_of(const SweepPoint& point) {
-  return static_cast<std::size_t>(std::lround(point.position_base_m.x()));
-}
 
 /// Expects every return exactly once, in the window in which it was fired and with its age at the window's end, and
 /// windows without gaps. A packet that arrives after another lidar's packet has closed the window goes into the next
@@ -239,86 +151,6 @@ TEST(SweepBuilder, WindowsDoNotCloseBeforeTheirTime) {
   EXPECT_EQ(built.sweeps.size(), before);
 }
 
-TEST(SweepBuilder, BackwardTimeRestarts) {
-  NumberedLidar lidar;
-  Built built;
-  built.play(lidar, seconds{1});
-  const std::size_t before = built.sweeps.size();
-  lidar.jump(-hours{1});
-  const Stamp jumped_to = lidar.next();
-  built.play(lidar, seconds{2});
-  EXPECT_EQ(built.builder.counters().restarts, 1U);
-  EXPECT_GT(built.builder.counters().late_packets, 0U);
-  EXPECT_LT(built.builder.counters().late_packets, 1000U) << "no more than a second and a bit is lost";
-  ASSERT_GT(built.sweeps.size(), before + 5);
-  EXPECT_GE(built.sweeps.back().start, jumped_to);
-  EXPECT_GT(built.sweeps.back().points.size(), 25'000U);
-}
-
-/// Packets delayed by a stalled network while other sensors advanced the time.
-TEST(SweepBuilder, PacketBurstDoesNotRestart) {
-  NumberedLidar lidar;
-  Built built;
-  built.play(lidar, seconds{1});
-  const Stamp released = lidar.next() + milliseconds{950};
-  for (Stamp now = lidar.next(); now < released; now += milliseconds{10})
-    built.builder.advance(now);
-  while (lidar.next() < released)
-    built.builder.add(lidar.packet(), released);
-  built.play(lidar, seconds{1});
-  EXPECT_GT(built.builder.counters().late_packets, 600U);
-  EXPECT_EQ(built.builder.counters().restarts, 0U);
-  for (std::size_t i = 1; i < built.sweeps.size(); ++i)
-    ASSERT_EQ(built.sweeps[i].start, built.sweeps[i - 1].end);
-  EXPECT_GT(built.sweeps.back().points.size(), 25'000U);
-}
-
-/// A sender that waits for a processor sends what it has saved up in time slices, slowly. This was taken for a clock
-/// that was set back: sweeps ended before others that were already given out.
-TEST(SweepBuilder, SlowCatchUpDoesNotRestart) {
-  NumberedLidar lidar;
-  Built built;
-  built.play(lidar, seconds{1});
-  Stamp arrival = lidar.next() + milliseconds{1400};
-  built.builder.advance(arrival);
-  for (int i = 0; i < 2000; ++i, arrival += microseconds{1100})
-    built.builder.add(lidar.packet(), arrival);
-  EXPECT_GT(built.builder.counters().late_packets, 900U);
-  EXPECT_EQ(built.builder.counters().restarts, 0U);
-  for (std::size_t i = 1; i < built.sweeps.size(); ++i)
-    ASSERT_EQ(built.sweeps[i].start, built.sweeps[i - 1].end);
-  EXPECT_GT(built.sweeps.back().points.size(), 25'000U);
-}
-
-/// The stamps of tf go back only where waiting would take longer than a listener bridges.
-TEST(SweepBuilder, OneSecondBackwardStepIsWaitedOut) {
-  for (const auto& [set_back, restarts] : {std::pair{milliseconds{1500}, 0U}, std::pair{milliseconds{5000}, 1U}}) {
-    NumberedLidar lidar;
-    Built built;
-    built.play(lidar, seconds{1});
-    lidar.jump(-set_back);
-    built.play(lidar, seconds{3});
-    EXPECT_EQ(built.builder.counters().restarts, restarts);
-    int went_back = 0;
-    for (std::size_t i = 1; i < built.sweeps.size(); ++i)
-      went_back += built.sweeps[i].end <= built.sweeps[i - 1].end ? 1 : 0;
-    EXPECT_EQ(went_back, restarts);
-    EXPECT_GT(built.sweeps.back().points.size(), 25'000U);
-  }
-}
-
-TEST(SweepBuilder, ForwardJumpOfAnHourSkipsEmptyWindows) {
-  NumberedLidar lidar;
-  Built built;
-  built.play(lidar, seconds{1});
-  lidar.jump(hours{1});
-  const Stamp jumped_to = lidar.next();
-  built.play(lidar, seconds{1});
-  EXPECT_EQ(built.builder.counters().restarts, 1U);
-  EXPECT_LT(built.sweeps.size(), 25U);
-  EXPECT_GE(built.sweeps.back().start, jumped_to);
-}
-
 TEST(SweepBuilder, LatePacketIsCountedAndDropped) {
   NumberedLidar lidar;
   Built built;
@@ -429,118 +261,6 @@ TEST(SweepBuilder, EachCloudOfOneInstantIsASweep) {
   }
 }
 
-TEST(SweepBuilder, ReturnsOutsideTheRangeAreDropped) {
-  SweepOptions options = keep_all();
-  options.min_range_m = 1.0;
-  options.max_range_m = 50.0;
-  for (const auto& [range_m, kept] : {std::pair{0.99F, false}, {1.0F, true}, {50.0F, true}, {50.1F, false}}) {
-    NumberedLidar lidar;
-    lidar.set_range_m(range_m);
-    Built built(options);
-    built.play(lidar, milliseconds{250});
-    ASSERT_FALSE(built.sweeps.empty());
-    EXPECT_EQ(!built.sweeps.front().points.empty(), kept) << range_m;
-    EXPECT_GT(built.sweeps.front().raw_returns, 0U);
-  }
-}
-
-TEST(SweepBuilder, ReturnsFromTheRobotItselfAreDropped) {
-  SweepOptions options = keep_all();
-  options.body_box = {.enabled = true, .min_m = {999.5, -1, -1}, .max_m = {2000.5, 1, 1}};
-  NumberedLidar lidar;
-  Built built(options);
-  built.play(lidar, milliseconds{250});
-  ASSERT_GE(built.sweeps.size(), 2U);
-  std::size_t seen = 0;
-  for (const SweepPoint& point : built.sweeps.front().points) {
-    EXPECT_FALSE(number_of(point) >= 1000 && number_of(point) <= 2000);
-    ++seen;
-  }
-  EXPECT_EQ(seen, built.sweeps.front().raw_returns - 1001);
-}
-
-TEST(SweepBuilder, PointsBeyondTheMemoryAreCounted) {
-  NumberedLidar lidar;
-  Built built(keep_all(), 1, {}, 10'000);
-  built.play(lidar, milliseconds{150});
-  ASSERT_FALSE(built.sweeps.empty());
-  EXPECT_EQ(built.sweeps.front().points.size(), 10'000U);
-  EXPECT_GE(built.builder.counters().overflowed_points, built.sweeps.front().raw_returns - 10'000);
-}
-
-TEST(SweepBuilder, SinkMayMoveThePointsOut) {
-  NumberedLidar lidar;
-  std::vector<SweepPoint> mine;
-  std::size_t sweeps = 0;
-  SweepBuilder builder(keep_all(), {Pose{}}, MotionSources({}, Fusion::combined), kMaxReturns, [&](Sweep& sweep) {
-    std::swap(mine, sweep.points);
-    ++sweeps;
-    if (sweeps > 2) {
-      EXPECT_NEAR(static_cast<double>(mine.size()), 28'930, 400);
-    }
-  });
-  while (lidar.next() < kStart + seconds{1}) {
-    const LidarPacket packet = lidar.packet();
-    builder.add(packet, packet.stamp);
-  }
-  EXPECT_GE(sweeps, 9U);
-}
-
-/// Wheels that report 10 m/s to the left, along y, where all numbered returns are at zero.
-class SweepsOfAMovingRobot : public testing::Test {
- protected:
-  static constexpr double kSpeed_mps = 10.0;
-
-  static std::vector<Sweep> sweeps(SweepOptions options, bool with_wheels) {
-    std::vector<MotionSourceOptions> sources;
-    if (with_wheels)
-      sources.push_back({"wheels", SourceKind::odometry, {}});
-    NumberedLidar lidar;
-    Built built(options, 1, sources);
-    Stamp next_sample = kStart - milliseconds{100};
-    while (lidar.next() < kStart + seconds{1}) {
-      for (; with_wheels && next_sample <= lidar.next() + kPacket; next_sample += milliseconds{5})
-        built.builder.sources().add(SourceId{0}, OdometrySample{next_sample,
-                                                                next_sample,
-                                                                {Eigen::Quaterniond::Identity(),
-                                                                 {0, kSpeed_mps * to_seconds(next_sample - kStart), 0}},
-                                                                1.0});
-      built.add(lidar.packet());
-    }
-    return built.sweeps;
-  }
-};
-
-TEST_F(SweepsOfAMovingRobot, PointsAreInTheFrameAtTheEndOfTheSweep) {
-  const std::vector<Sweep> corrected = sweeps(keep_all(), true);
-  ASSERT_GE(corrected.size(), 9U);
-  for (const Sweep& sweep : corrected) {
-    EXPECT_EQ(sweep.uncorrected, Uncorrected::nothing);
-    EXPECT_TRUE(sweep.motion.sources[0].usable);
-    for (const SweepPoint& point : sweep.points)
-      ASSERT_NEAR(point.position_base_m.y(), -kSpeed_mps * static_cast<double>(point.age_s), 1e-3);
-  }
-}
-
-TEST_F(SweepsOfAMovingRobot, WithoutDeskewPointsAreAsMeasured) {
-  SweepOptions options = keep_all();
-  options.motion_correction = false;
-  for (const Sweep& sweep : sweeps(options, true)) {
-    EXPECT_EQ(sweep.uncorrected, Uncorrected::nothing) << "nor does anybody else correct them";
-    EXPECT_TRUE(sweep.motion.sources[0].usable) << "the wheels still tell how far";
-    for (const SweepPoint& point : sweep.points)
-      ASSERT_EQ(point.position_base_m.y(), 0.0F);
-  }
-}
-
-TEST_F(SweepsOfAMovingRobot, WithoutASourceDeskewIsLeftToOdometry) {
-  for (const Sweep& sweep : sweeps(keep_all(), false)) {
-    EXPECT_EQ(sweep.uncorrected, Uncorrected::all);
-    for (const SweepPoint& point : sweep.points)
-      ASSERT_EQ(point.position_base_m.y(), 0.0F);
-  }
-}
-
 TEST(RevolutionTimer, KnowsTheSpeedAfterOneRevolution) {
   for (const double rpm : {300.0, 599.0, 600.0, 901.0, 1200.0}) {
     RevolutionTimer timer;
@@ -564,4 +284,4 @@ TEST(RevolutionTimer, IgnoresGapsAndOtherLidars) {
 }
 
 } // namespace
-} // namespace locus
+} // namespace locus::test

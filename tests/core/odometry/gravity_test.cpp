@@ -3,7 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "core/odometry/flat_ground.hpp"
+#include <algorithm>
+#include <cmath>
 
 namespace locus {
 namespace {
@@ -77,70 +78,6 @@ TEST(Gravity, AnAttitudeIsPreferredToTheAccelerometer) {
   sweep.motion.up_base = from_rpy_rad({0, 2 * kRadPerDeg, 0}).conjugate() * kUp;
   gravity.observe(kNoTurn, sweep);
   EXPECT_NEAR(tilt_deg(gravity), 2.0, 1e-9);
-}
-
-// --- Flat ground ------------------------------------------------------------------------------------------------
-
-Eigen::Vector3d up_at_pitch_deg(double pitch_deg) {
-  return from_rpy_rad({0, pitch_deg * kRadPerDeg, 0}).conjugate() * kUp;
-}
-Stamp at(int sweep) { return stamp_from_ns(1'000'000'000) + sweep * kPeriod; }
-
-TEST(FlatGround, StartsAfterTwoLevelSecondsAndEndsAtOnceOnARamp) {
-  FlatGroundAssumption ground(FlatGround::automatic);
-  for (int i = 0; i < 20; ++i) {
-    ground.observe(at(i), up_at_pitch_deg(0.5));
-    EXPECT_FALSE(ground.holds()) << i;
-  }
-  ground.observe(at(20), up_at_pitch_deg(0.5));
-  EXPECT_TRUE(ground.holds());
-  ground.observe(at(21), up_at_pitch_deg(4.0));
-  EXPECT_FALSE(ground.holds());
-  ground.observe(at(22), up_at_pitch_deg(0.0));
-  EXPECT_FALSE(ground.holds()) << "one level sweep is no floor";
-}
-
-TEST(FlatGround, NeedsGravity) {
-  FlatGroundAssumption ground(FlatGround::automatic);
-  for (int i = 0; i < 30; ++i)
-    ground.observe(at(i), kUp);
-  EXPECT_TRUE(ground.holds());
-  ground.observe(at(30), std::nullopt);
-  EXPECT_FALSE(ground.holds());
-}
-
-TEST(FlatGround, SetByContextIgnoresGravity) {
-  FlatGroundAssumption on(FlatGround::on), off(FlatGround::off);
-  for (int i = 0; i < 30; ++i) {
-    on.observe(at(i), up_at_pitch_deg(10));
-    off.observe(at(i), kUp);
-  }
-  EXPECT_TRUE(on.holds());
-  EXPECT_FALSE(off.holds());
-}
-
-const Pose kLast{Eigen::Quaterniond::Identity(), {0, 0, 0.2}};
-const Pose kRolledUpward{from_rpy_rad({0.02, -0.03, 0.5}), {1.0, 0.3, 0.25}};
-
-TEST(FlatGround, SetByContextRetainsOnlyHeadingAndPath) {
-  const FlatGroundAssumption ground(FlatGround::on);
-  const Pose flat = ground.flatten(kLast, kRolledUpward, 1e8 * Matrix6::Identity());
-  EXPECT_LT((flat.translation - Eigen::Vector3d(1.0, 0.3, 0.2)).norm(), 1e-12);
-  EXPECT_LT((to_rpy_rad(flat.rotation) - Eigen::Vector3d(0, 0, 0.5)).norm(), 1e-3);
-}
-
-TEST(FlatGround, DetectedYieldsToLidarWhereThatIsMoreCertain) {
-  FlatGroundAssumption ground(FlatGround::automatic);
-  for (int i = 0; i < 30; ++i)
-    ground.observe(at(i), kUp);
-  const Pose blind = ground.flatten(kLast, kRolledUpward, Matrix6::Zero());
-  EXPECT_LT((blind.translation - Eigen::Vector3d(1.0, 0.3, 0.2)).norm(), 1e-12);
-  EXPECT_LT((to_rpy_rad(blind.rotation) - Eigen::Vector3d(0, 0, 0.5)).norm(), 1e-3);
-
-  const Matrix6 information = along_each_axis(0.001, 0.03).cwiseAbs2().cwiseInverse().asDiagonal();
-  const Pose seen = ground.flatten(kLast, kRolledUpward, information);
-  EXPECT_LT((seen.translation - kRolledUpward.translation).norm(), 0.003);
-  EXPECT_LT(angle_rad(seen.rotation * kRolledUpward.rotation.conjugate()), 5e-4);
 }
 
 // --- Tilt -------------------------------------------------------------------------------------------------------
