@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/map/correspondences.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include "core/surfaces.hpp"
+
+namespace locus {
+namespace {
+
+constexpr std::size_t kMapBytes = 20'000'000;
+constexpr double kGate_m = 1.0;
+
+/// Floor at height zero, 9 x 9 m around the origin.
+SurfaceMap floor_map() {
+  SurfaceMap map(kMapBytes);
+  map.insert(test::points_on({{{-4.5, -4.5, 0}, {9, 0, 0}, {0, 9, 0}}}, 20'000), Pose{});
+  return map;
+}
+
+SourceBlock block_of(const std::vector<Eigen::Vector3f>& positions_m) {
+  std::vector<SurfacePoint> points;
+  for (const Eigen::Vector3f& position_m : positions_m)
+    points.push_back({position_m, Eigen::Vector3f::Zero()});
+  return SourceBlock(points);
+}
+
+GicpPass pass_in(const SurfaceMap& map, LookUp look_up = LookUp::here) {
+  return {.target = map,
+          .T_target_source = Pose{},
+          .origin_m = Eigen::Vector3d::Zero(),
+          .look_up = look_up,
+          .accepts_shapeless = false,
+          .max_correspondence_m = kGate_m,
+          .width2 = 144.0};
+}
+
+MatchBlock matches_of(const GicpPass& pass, const SourceBlock& source) {
+  MatchBlock matches;
+  find(pass, source, matches, Isa::baseline);
+  return matches;
+}
+
+TEST(Correspondences, PointNearAPlaneIsMatchedWithIt) {
+  const SurfaceMap map = floor_map();
+  const MatchBlock matches = matches_of(pass_in(map), block_of({{0.1F, 0.1F, 0.2F}}));
+  EXPECT_EQ(matches.found[0], 1.0F);
+  EXPECT_NEAR(matches.z_m[0], 0.0, 0.01) << "mean of the surface";
+  EXPECT_NEAR(std::abs(matches.normal_z[0]), 1.0, 0.01);
+  EXPECT_GT(matches.along_m2[0], 1e3F * matches.across_m2[0]) << "a plane constrains its normal only";
+}
+
+TEST(Correspondences, PoseMovesThePoints) {
+  const SurfaceMap map = floor_map();
+  GicpPass pass = pass_in(map);
+  pass.T_target_source = {so3_exp({0, 0, 1.0}), {0.0, 0.0, -5.0}};
+  EXPECT_EQ(matches_of(pass, block_of({{0, 0, 5.0F}})).found[0], 1.0F);
+  EXPECT_EQ(matches_of(pass, block_of({{0, 0, 0.0F}})).found[0], 0.0F);
+}
+
+/// Fine voxels are 0.5 m, coarse ones 1.5 m, both centred on the floor.
+TEST(Correspondences, CoarseVoxelServesWhereTheFineOneIsEmpty) {
+  const SurfaceMap map = floor_map();
+  const MatchBlock matches = matches_of(pass_in(map), block_of({{0, 0, 0.6F}, {0, 0, 0.9F}}));
+  EXPECT_EQ(matches.found[0], 1.0F) << "in the coarse voxel of the floor";
+  EXPECT_EQ(matches.found[1], 0.0F) << "above it";
+}
+
+TEST(Correspondences, GateIsTheDistanceAcrossThePlane) {
+  const SurfaceMap map = floor_map();
+  GicpPass pass = pass_in(map);
+  pass.max_correspondence_m = 0.15;
+  const MatchBlock matches = matches_of(pass, block_of({{0.24F, 0.24F, 0.1F}, {0, 0, 0.2F}}));
+  EXPECT_EQ(matches.found[0], 1.0F) << "a third of a metre from the mean, along the plane";
+  EXPECT_EQ(matches.found[1], 0.0F);
+}
+
+TEST(Correspondences, FollowRetainsTheMatchWithinAVoxelOnly) {
+  const SurfaceMap map = floor_map();
+  MatchBlock matches = matches_of(pass_in(map), block_of({{0, 0, 0.1F}, {0, 0, 0.1F}}));
+  const SurfaceMap nothing(kMapBytes);
+  find(pass_in(nothing, LookUp::follow), block_of({{0.1F, 0, 0.2F}, {0, 0, 0.4F}}), matches, Isa::baseline);
+  EXPECT_EQ(matches.found[0], 1.0F) << "in the same voxel";
+  EXPECT_EQ(matches.found[1], 0.0F) << "in the next one, which is looked up";
+}
+
+TEST(Correspondences, HereLooksUpEveryPoint) {
+  const SurfaceMap map = floor_map();
+  MatchBlock matches = matches_of(pass_in(map), block_of({{0, 0, 0.1F}}));
+  const SurfaceMap nothing(kMapBytes);
+  find(pass_in(nothing), block_of({{0, 0, 0.1F}}), matches, Isa::baseline);
+  EXPECT_EQ(matches.found[0], 0.0F);
+}
+
+TEST(Correspondences, AroundReachesTheNextVoxel) {
+  const SurfaceMap map = floor_map();
+  const SourceBlock source = block_of({{0, 0, 1.2F}, {0, 0, 1.8F}});
+  EXPECT_EQ(matches_of(pass_in(map), source).found[0], 0.0F);
+  const MatchBlock matches = matches_of(pass_in(map, LookUp::around), source);
+  EXPECT_EQ(matches.found[0], 1.0F);
+  EXPECT_NEAR(matches.z_m[0], 0.0, 0.01);
+  EXPECT_EQ(matches.found[1], 0.0F) << "more than a coarse voxel away";
+}
+
+TEST(Correspondences, AroundFindsTheNearestSurface) {
+  SurfaceMap map(kMapBytes);
+  map.insert(
+      test::points_on({{{-4.5, -4.5, 0}, {9, 0, 0}, {0, 9, 0}}, {{-4.5, -4.5, 3}, {9, 0, 0}, {0, 9, 0}}}, 20'000),
+      Pose{});
+  const MatchBlock matches = matches_of(pass_in(map, LookUp::around), block_of({{0, 0, 1.2F}, {0, 0, 1.8F}}));
+  EXPECT_NEAR(matches.z_m[0], 0.0, 0.01);
+  EXPECT_NEAR(matches.z_m[1], 3.0, 0.01);
+}
+
+/// A cluster of points without a plane in the voxel around the origin, in a map of `sweeps` sweeps.
+SurfaceMap thicket(int sweeps) {
+  std::mt19937 random{7};
+  std::uniform_real_distribution<float> unit{-0.1F, 0.1F};
+  std::vector<SurfacePoint> points;
+  for (int i = 0; i < 12; ++i)
+    points.push_back({{unit(random), unit(random), unit(random)}, Eigen::Vector3f::Zero()});
+  SurfaceMap map(kMapBytes);
+  for (int i = 0; i < sweeps; ++i)
+    map.insert(points, Pose{});
+  return map;
+}
+
+TEST(Correspondences, ShapelessVoxelsServeOnlyIfAccepted) {
+  const SurfaceMap map = thicket(3);
+  GicpPass pass = pass_in(map);
+  const SourceBlock source = block_of({{0.05F, 0, 0}});
+  EXPECT_EQ(matches_of(pass, source).found[0], 0.0F);
+  pass.accepts_shapeless = true;
+  const MatchBlock matches = matches_of(pass, source);
+  EXPECT_EQ(matches.found[0], 1.0F);
+  EXPECT_EQ(matches.across_m2[0], matches.along_m2[0]) << "a ball";
+  EXPECT_EQ(matches.normal_x[0] + matches.normal_y[0] + matches.normal_z[0], 0.0F);
+  EXPECT_EQ(matches.unknown[0], 0.0F);
+}
+
+/// The points of one sweep lie where its scan lines fell.
+TEST(Correspondences, ShapeOfOneSweepIsUnknown) {
+  const SurfaceMap map = thicket(1);
+  GicpPass pass = pass_in(map);
+  pass.accepts_shapeless = true;
+  const MatchBlock matches = matches_of(pass, block_of({{0.05F, 0, 0}, {3, 0, 0}}));
+  EXPECT_EQ(matches.found[0], 0.0F);
+  EXPECT_EQ(matches.unknown[0], 1.0F);
+  EXPECT_EQ(matches.unknown[1], 0.0F) << "empty space";
+}
+
+TEST(Correspondences, OriginOfTheCoordinatesIsArbitrary) {
+  const SurfaceMap map = floor_map();
+  GicpPass pass = pass_in(map);
+  const SourceBlock source = block_of({{1.1F, -2.2F, 0.2F}});
+  const MatchBlock near = matches_of(pass, source);
+  pass.origin_m = {100.3, -50.2, 7.1};
+  const MatchBlock far = matches_of(pass, source);
+  EXPECT_EQ(far.found[0], 1.0F);
+  EXPECT_NEAR(static_cast<double>(far.x_m[0]) + 100.3, near.x_m[0], 1e-4);
+  EXPECT_NEAR(static_cast<double>(far.y_m[0]) - 50.2, near.y_m[0], 1e-4);
+  EXPECT_NEAR(static_cast<double>(far.z_m[0]) + 7.1, near.z_m[0], 1e-4);
+}
+
+TEST(Correspondences, PointsOutOfReachHaveNone) {
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInfinity = std::numeric_limits<float>::infinity();
+  const SurfaceMap map = floor_map();
+  for (const LookUp look_up : {LookUp::here, LookUp::follow, LookUp::around}) {
+    MatchBlock matches = matches_of(pass_in(map), block_of({{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}}));
+    find(pass_in(map, look_up), block_of({{kNan, 0, 0}, {0, kInfinity, 0}, {1e9F, 0, 0}, {0, 0, 0.1F}}), matches,
+         Isa::baseline);
+    EXPECT_EQ(matches.found[0] + matches.found[1] + matches.found[2], 0.0F);
+    EXPECT_EQ(matches.found[3], 1.0F);
+  }
+}
+
+/// The kernel runs over whole blocks.
+TEST(Correspondences, EntriesBeyondTheLastPointHaveNone) {
+  const SurfaceMap map = floor_map();
+  MatchBlock matches = matches_of(pass_in(map), block_of(std::vector<Eigen::Vector3f>(kGicpBlock, {0, 0, 0.1F})));
+  find(pass_in(map), block_of({{0, 0, 0.1F}}), matches, Isa::baseline);
+  EXPECT_EQ(matches.found[0], 1.0F);
+  for (std::size_t i = 1; i < kGicpBlock; ++i)
+    ASSERT_EQ(matches.found[i] + matches.unknown[i], 0.0F) << i;
+}
+
+TEST(Correspondences, AreTheSameForEveryInstructionSet) {
+  const SurfaceMap map = floor_map();
+  const auto points = test::points_on({{{-4, -4, 0}, {8, 0, 0}, {0, 8, 0.5}}}, kGicpBlock, 3);
+  const SourceBlock source(points);
+  const MatchBlock expected = matches_of(pass_in(map), source);
+  for (const Isa isa : {Isa::avx2, Isa::avx512}) {
+    if (!is_supported(isa))
+      continue;
+    MatchBlock matches;
+    find(pass_in(map), source, matches, isa);
+    EXPECT_EQ(matches.found, expected.found);
+    EXPECT_EQ(matches.normal_z, expected.normal_z);
+  }
+}
+
+} // namespace
+} // namespace locus
