@@ -123,8 +123,9 @@ TEST_F(Mountings, PartThatIsNotSetIsReadFromTheStaticTransforms) {
 }
 
 TEST_F(Mountings, BaseFrameIsTheConfiguredOne) {
-  const std::string bag = bag_with(
-      {{"base_link", "mast", kTurnedMast}, {"mast", "velodyne", {{1, 0, 0, 0}, {0, 0, 0.1}}}, {"mast", "imu_link", kTurned}});
+  const std::string bag = bag_with({{"base_link", "mast", kTurnedMast},
+                                    {"mast", "velodyne", {{1, 0, 0, 0}, {0, 0, 0.1}}},
+                                    {"mast", "imu_link", kTurned}});
   const std::string
       lidar = "the lidar (velodyne) is mounted at 0.000 0.000 0.100 m, 0.0 0.0 0.0 deg on mast, by /tf_static",
       imu = "imu (imu_link) is mounted at 0.100 0.000 0.050 m, 90.0 0.0 0.0 deg on mast, by /tf_static";
