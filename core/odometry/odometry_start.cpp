@@ -15,9 +15,10 @@ namespace {
 constexpr double kMinOverlap = 0.3;
 
 constexpr double kUnknownRate_radps = 10.0; ///< standard deviation of an unknown turn rate: a flick of a hand
-/// Prior odds, as twice their logarithm, of a rest during the first two sweeps: of any drive, and of one that continues
-/// another which ended at rest.
-constexpr double kBeginsAtRest = 9.2, kContinuesAtRest = 20.0;
+/// Prior odds, as twice their logarithm, of a rest during the first two sweeps: where a source measures the
+/// translation; where points alone do, maybe those of people who walk past; of a drive that continues another which
+/// ended at rest.
+constexpr double kBeginsAtRest = 9.2, kBeginsAtRestUnmeasured = 20.0, kContinuesAtRest = 20.0;
 constexpr int kRounds = 8;        ///< most iterations until motion and de-skew of the first two sweeps agree
 constexpr double kAgrees = 0.002; ///< change per iteration below which they agree: metres, radians
 
@@ -199,9 +200,10 @@ Odometry::Start Odometry::start_without(std::bitset<kMaxSources> without, const 
     if (difference(T_odom_base, T_before).cwiseAbs().maxCoeff() < kAgrees || stop())
       break;
   }
+  const double begins_at_rest = choose_among(sweep, without).translation ? kBeginsAtRest : kBeginsAtRestUnmeasured;
   const double odds_of_rest = continues_motion_ ? -odds_of_sources(sweep, {})
                               : start_          ? kContinuesAtRest
-                                                : kBeginsAtRest - unknown.surprise_at_rest();
+                                                : begins_at_rest - unknown.surprise_at_rest();
   if (evidence(rest, start.fit) + odds_against_stuck(repeating_sources(sweep)).value_or(0.0) > -odds_of_rest)
     start = {.without = kAllSources, .rests = true, .twist_base = Vector6::Zero(), .fit = rest};
   return start;

@@ -136,6 +136,7 @@ TEST_F(RestartWithHeldInput, DiscoversLatePublishersWhileTheTimeStandsStill) {
     return std::ranges::all_of(now["sources"], [&](const auto& source) { return source["writers"] == expected; });
   };
   daemon_.emplace(service);
+  ASSERT_TRUE(daemon_->wait_for_line("DDS is up")); // the player ends if no service answers
   led_time().hold_at_ns = Duration{seconds{1}}.count();
   play_.emplace(leading_play({plant().string()}));
   ASSERT_TRUE(is_held());
