@@ -180,8 +180,10 @@ void SweepStatistics::add(const ProcessedSweep& sweep) {
     ++sums_.used_sweeps[index_of(*prior.translation)];
   if (sums_.sweeps > 1 && !prior.rotation && !prior.translation)
     ++sums_.without_source;
-  for (std::size_t i = 0; i < kMaxSources; ++i)
+  for (std::size_t i = 0; i < kMaxSources; ++i) {
     sums_.largest_test_ratios[i] = std::max(sums_.largest_test_ratios[i], estimate.sources[i].test_ratio);
+    compare(estimate, i, comparisons_[i]);
+  }
   if (estimate.state == TrackingState::dead_reckoning)
     ++sums_.dead_reckoned;
   add_to_trajectory(estimate);
@@ -209,6 +211,9 @@ SweepFigures SweepStatistics::figures() const {
   figures.process_ms = percentiles(&Timing::wall_ms);
   figures.process_cpu_ms = percentiles(&Timing::cpu_ms);
   figures.rate_hz = rate_hz();
+  for (std::size_t i = 0; i < kMaxSources; ++i)
+    if (comparisons_[i])
+      figures.compared[i] = comparisons_[i]->findings();
   figures.trajectory_digest = trajectory_.hex().substr(0, kDigits);
   return figures;
 }

@@ -17,6 +17,7 @@
 #include "core/ingest/sweep.hpp"
 #include "daemon/incidents.hpp"
 #include "daemon/ingest.hpp"
+#include "daemon/odometry_comparison.hpp"
 #include "daemon/recorder.hpp"
 #include "daemon/sweep_processor.hpp"
 
@@ -128,8 +129,9 @@ struct SweepFigures {
   double raw_points = 0, filtered_points = 0, scan_to_scan_iterations = 0, scan_to_submap_iterations = 0;
   /// Number of sweeps whose prior came from the source, fully or in part.
   std::array<std::uint64_t, kMaxSources> used_sweeps{};
-  std::array<double, kMaxSources> largest_test_ratios{}; ///< by source; zero without a comparison
-  std::uint64_t dead_reckoned = 0;                       ///< sweeps in this state
+  std::array<double, kMaxSources> largest_test_ratios{};               ///< by source; zero without a comparison
+  std::array<std::optional<OdometryFindings>, kMaxSources> compared{}; ///< by source; nothing for an IMU
+  std::uint64_t dead_reckoned = 0;                                     ///< sweeps in this state
   std::uint64_t without_source = 0; ///< sweeps after the first whose prior no source measured, not even in part
   StageTimes stages{};
   double path_m = 0;
@@ -163,7 +165,8 @@ class SweepStatistics {
   void add_to_trajectory(const OdometryEstimate& estimate);
 
   std::size_t window_;
-  SweepFigures sums_;           ///< distributions, rate and digest are unset
+  SweepFigures sums_; ///< distributions, rate, digest and comparisons are unset
+  std::array<std::optional<OdometryComparison>, kMaxSources> comparisons_;
   std::vector<Timing> timings_; ///< ring buffer once it holds `window_` entries
   Stamp trajectory_start_;
   Sha256 trajectory_;

@@ -138,7 +138,9 @@ ordered_json source_json(const Figures& figures, std::size_t i) {
     json["verdict"] = verdict;
   const MotionSource& options = figures.config.motion_sources[i];
   if (figures.sweeps.last && figures.sweeps.last->sources[i].learned && options.calibration != Calibration::off)
-    json["learned"] = learned_json(options, *figures.sweeps.last->sources[i].learned);
+    json["learned"] = learned_json(options, *figures.sweeps.last->sources[i].learned, false, findings_on(figures, i));
+  if (const std::string warning = calibration_warning(figures, i); !warning.empty())
+    json["calibration_warning"] = warning;
   if (figures.live && figures.sweeps.last) {
     const SourceReport& report = figures.sweeps.last->sources[i];
     json["innovation"] = innovation_json(report);
@@ -242,6 +244,11 @@ ordered_json to_json(const Figures& figures) {
   for (std::size_t i = 0; i < config.lidars.size(); ++i)
     json["lidars"][config.lidars[i].name] =
         config.lidars[i].gives_clouds() ? cloud_lidar_json(figures, i) : lidar_json(figures, i);
+  if (const auto turn = turn_of_lidars(config.motion_sources, figures.sweeps.compared))
+    for (const LidarOptions& lidar : config.lidars)
+      json["lidars"][lidar.name]["learned"] = learned_json(lidar, *turn);
+  if (const std::string warning = lidar_mounting_warning(figures); !warning.empty())
+    json["mounting_warning"] = warning;
   json["sweeps"] = {{"seen", counters.seen},
                     {"processed", counters.processed},
                     {"dropped", counters.dropped},

@@ -102,6 +102,8 @@ std::string lidars_text(const Figures& figures) {
     if (const std::string problem = problem_of(options, lidar); !problem.empty())
       text += fmt::format("{:<9}{}\n", "", problem);
   }
+  if (const std::string warning = lidar_mounting_warning(figures); !warning.empty())
+    text += fmt::format("{:<9}{}\n", "", warning);
   return text;
 }
 

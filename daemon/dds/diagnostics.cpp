@@ -7,6 +7,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "daemon/calibration.hpp"
+
 namespace locus::daemon {
 
 using nlohmann::ordered_json;
@@ -46,11 +48,13 @@ Diagnostic odometry_diagnostic(const Figures& figures, const ordered_json& json,
   return diagnostic(is_well ? Level::ok : Level::warning, "", std::string{to_string(last->state)}, values);
 }
 
+/// `mounting`: warning of an error in the mounting of all lidars, or empty.
 Diagnostic lidar_diagnostic(const LidarOptions& options, const IngestReport::Lidar& lidar, const ordered_json& values,
-                            Stamp now) {
+                            const std::string& mounting, Stamp now) {
   const std::optional<Duration> silence = lidar.used() > 0 ? std::optional(now - lidar.last_received) : std::nullopt;
   const bool is_silent = silence && *silence > kStale;
-  const std::string problem = problem_of(options, lidar);
+  const std::string fault = problem_of(options, lidar);
+  const std::string& problem = fault.empty() ? mounting : fault;
   return diagnostic(!silence           ? Level::error
                     : is_silent        ? Level::stale
                     : !problem.empty() ? Level::warning
@@ -83,14 +87,15 @@ std::vector<Diagnostic> diagnostics(const Figures& figures, Stamp now) {
     ordered_json values = json["lidars"][options.name];
     if (!options.gives_clouds())
       values["packets"] = json["packets"][options.name];
-    all.push_back(lidar_diagnostic(options, figures.ingest.lidars[i], values, now));
+    all.push_back(lidar_diagnostic(options, figures.ingest.lidars[i], values, lidar_mounting_warning(figures), now));
   }
   for (std::size_t i = 0; i < figures.config.motion_sources.size(); ++i) {
     const std::string& name = figures.config.motion_sources[i].name;
     const IngestReport::Source& source = figures.ingest.sources[i];
-    const std::string verdict = source.healthy ? "" : verdict_on(source, figures.live.has_value());
-    all.push_back(diagnostic(source.healthy ? Level::ok : Level::warning, ": source " + name,
-                             verdict.empty() ? std::string{health_of(source)} : verdict, json["sources"][name]));
+    const std::string fault =
+        source.healthy ? calibration_warning(figures, i) : verdict_on(source, figures.live.has_value());
+    all.push_back(diagnostic(source.healthy && fault.empty() ? Level::ok : Level::warning, ": source " + name,
+                             fault.empty() ? std::string{health_of(source)} : fault, json["sources"][name]));
   }
   return all;
 }

@@ -182,6 +182,12 @@ void SessionMonitor::check_calibration(const Figures& figures) {
       miscalibrated_.set(i);
     }
   }
+  if (mounting_logged_)
+    return;
+  if (const std::string warning = lidar_mounting_warning(figures); !warning.empty()) {
+    log_.warn(warning);
+    mounting_logged_ = true;
+  }
 }
 
 void SessionMonitor::check_speed(double largest_mps) {

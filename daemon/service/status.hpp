@@ -75,7 +75,7 @@ class SessionMonitor {
   bool was_connected_ = false;
   std::uint64_t logged_attempts_ = 0;
   std::array<Lidar, kMaxLidars> lidars_;
-  bool speed_logged_ = false;
+  bool speed_logged_ = false, mounting_logged_ = false;
   std::bitset<kMaxSources> slow_imus_logged_;
   std::array<std::string_view, kMaxSources> logged_verdicts_; ///< last logged verdicts
   std::bitset<kMaxSources> miscalibrated_;                    ///< sources with a logged calibration error

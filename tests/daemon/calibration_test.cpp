@@ -104,6 +104,85 @@ TEST(Calibration, FiguresAreListedWithDeviationsAndConfiguration) {
   EXPECT_DOUBLE_EQ(of_wheels["yaw_scale"]["value"], 0.98);
 }
 
+OdometryFindings findings(double late_s, const Eigen::Vector3d& lidar_turn_deg) {
+  OdometryFindings found{.late_s = {late_s, 1e-4}};
+  for (int axis = 0; axis < 3; ++axis)
+    found.lidar_turn_rad[static_cast<std::size_t>(axis)] = {lidar_turn_deg[axis] * kRadPerDeg, 0.1 * kRadPerDeg};
+  return found;
+}
+
+/// Figures after a comparison of wheels with lidar, with an IMU of this mounting error.
+struct Compared {
+  Config config;
+  Figures figures{.config = config};
+
+  explicit Compared(const OdometryFindings& found, const Eigen::Vector3d& imu_turn_deg = {0, 0, 0}) {
+    figures.sweeps.compared[0] = found; // of wio; the other source is the IMU
+    figures.sweeps.last.emplace().sources[1].learned = gyro(0, imu_turn_deg);
+  }
+};
+
+TEST(Calibration, LatenessOfAnOdometryIsReportedAndListed) {
+  Compared compared(findings(0.04, {0, 0, 0}));
+  EXPECT_NE(calibration_warning(compared.figures, 0).find("40 ms later than lidar does; make"), std::string::npos);
+  EXPECT_NE(calibration_warning(compared.figures, 0).find("late_ms: 40"), std::string::npos);
+  const nlohmann::json json = learned_json(kWio, wheels(1, 1, 0.001), false, findings_on(compared.figures, 0));
+  EXPECT_DOUBLE_EQ(json["late_ms"]["value"], 40.0);
+  EXPECT_DOUBLE_EQ(json["late_ms"]["configured"], 0.0);
+  EXPECT_DOUBLE_EQ(json["calibrated"]["late_ms"], 40.0);
+  compared.config.motion_sources[0].late_ms = 10.0;
+  EXPECT_NEAR(findings_on(compared.figures, 0)->late_s.mean, 0.05, 1e-9) << "10 ms are subtracted already";
+  compared.config.motion_sources[0].calibration = Calibration::off;
+  EXPECT_EQ(calibration_warning(compared.figures, 0), "");
+}
+
+TEST(Calibration, LatenessThatADriveDoesNotDetermineStaysAsConfigured) {
+  MotionSourceOptions wio = kWio;
+  wio.late_ms = 30.0;
+  const OdometryFindings unknown;
+  EXPECT_EQ(calibrated(wio, wheels(1, 1, 0.001), unknown), wio);
+  const nlohmann::json json = learned_json(wio, wheels(1, 1, 0.001), false, unknown);
+  EXPECT_DOUBLE_EQ(json["late_ms"]["value"], 30.0);
+}
+
+/// With a gyro the estimator does not use the yaw of wheels.
+TEST(Calibration, YawScaleIsThatOfTheComparisonWhereTheEstimatorHasNone) {
+  OdometryFindings found = findings(0, {0, 0, 0});
+  found.yaw_scale = {-0.15, 0.002};
+  LearnedSource learned = as_configured(kWio);
+  EXPECT_DOUBLE_EQ(calibrated(kWio, learned, found).yaw_scale, 0.85);
+  EXPECT_DOUBLE_EQ(calibrated(kWio, wheels(1, 0.95, 0.001), found).yaw_scale, 0.95) << "more certain";
+}
+
+TEST(Calibration, TiltedLidarIsReportedInsteadOfTheImu) {
+  const Compared tilted(findings(0, {0, 4, 0}), {0, -4, 0});
+  const std::string warning = lidar_mounting_warning(tilted.figures);
+  EXPECT_NE(warning.find("lidar front is rotated by +4.0 degrees about y (pitch)"), std::string::npos) << warning;
+  EXPECT_NE(warning.find("wio"), std::string::npos);
+  EXPECT_EQ(calibration_warning(tilted.figures, 1), "");
+  EXPECT_EQ(lidar_mounting_warning(Compared(findings(0, {1.5, -1.5, 1.5})).figures), "");
+  const Compared imu(findings(0, {0, 0, 0}), {0, -4, 0});
+  EXPECT_EQ(lidar_mounting_warning(imu.figures), "");
+  EXPECT_NE(calibration_warning(imu.figures, 1), "");
+}
+
+TEST(Calibration, RotationOfALidarIsListedAndWritten) {
+  LidarOptions lidar;
+  lidar.T_base_lidar = {from_rpy_rad({0, 0, 90 * kRadPerDeg}), {0, 0, 0.8}};
+  const Compared tilted(findings(0, {0, 4, 0.1}));
+  const auto turn = turn_of_lidars(tilted.config.motion_sources, tilted.figures.sweeps.compared);
+  ASSERT_TRUE(turn);
+  const nlohmann::ordered_json lidars{{"front", {{"learned", learned_json(lidar, *turn)}}}};
+  const std::string yaml = calibration_yaml(nlohmann::ordered_json::object(), lidars);
+  EXPECT_EQ(yaml,
+            "# For the entries of the same name.\nlidars:\n  - name: front\n"
+            "    T_base_lidar: {xyz_m: [0, 0, 0.8], rpy_deg: [4, 0, 90]} # sd 0.1, 0.1, 0.1 degrees about x, y, z "
+            "of base\n");
+  EXPECT_TRUE(parse_config("version: 1\ndefaults: true\n" + yaml, "pasted"));
+  EXPECT_NE(calibration_text(nlohmann::ordered_json::object(), lidars).find("4 +- 0.1  better known than configured"),
+            std::string::npos);
+}
+
 /// The learned rotation is in the base frame, composed with the configured one.
 TEST(Calibration, BetterKnownValuesReplaceTheConfiguredOnes) {
   const MotionSourceOptions imu = calibrated(imu_turned({0, 0, 90}), gyro(0.034, {5, 0, 0}));

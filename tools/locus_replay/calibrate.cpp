@@ -44,6 +44,7 @@ struct Rates {
 
 struct Pass {
   LearnedSources learned; ///< with the time each was last received
+  std::array<std::optional<daemon::OdometryComparison>, kMaxSources> comparisons;
   Rates rates;
 };
 
@@ -54,6 +55,7 @@ Pass replay(const Arguments& arguments, Config config, ChosenRecording chosen, c
   std::vector<Duration> earlier;
   for (MotionSource& source : config.motion_sources)
     earlier.push_back(from_seconds(1e-3 * std::exchange(source.late_ms, 0.0)));
+  chosen.config = config;
   OpenRecording open = open_recording(arguments, chosen, earlier);
   Pass pass;
   daemon::InlinePipeline pipeline(
@@ -61,6 +63,8 @@ Pass replay(const Arguments& arguments, Config config, ChosenRecording chosen, c
         for (std::size_t i = 0; i < pass.learned.size(); ++i)
           if (done.estimate.sources[i].learned)
             pass.learned[i] = done.estimate.sources[i].learned;
+        for (std::size_t i = 0; i < pass.comparisons.size(); ++i)
+          daemon::compare(done.estimate, i, pass.comparisons[i]);
         show(open.recording->progress());
         if (!done.estimate.failed)
           pass.rates.estimated.push_back({sweep.start, sweep.end, done.estimate.twist_base.tail<3>()});
@@ -130,6 +134,34 @@ double coarse_lateness_ms(const std::vector<Rates::Gyro>& gyro, const std::vecto
   return as_configured && best < kPlainly * *as_configured ? 1e3 * to_seconds(late) : 0.0;
 }
 
+using Findings = std::array<std::optional<daemon::OdometryFindings>, kMaxSources>;
+
+/// Returns the comparisons of a pass with the lateness beyond that which it removed.
+Findings findings_of(const Pass& played) {
+  Findings found;
+  for (std::size_t i = 0; i < found.size(); ++i)
+    if (played.comparisons[i])
+      found[i] = played.comparisons[i]->findings();
+  return found;
+}
+
+/// Rotates the lidars of `config`. What is observed relative to them rotates along: an IMU whose mounting is determined
+/// by lidar, and one inside a lidar.
+void turn_lidars(Config& config, const Eigen::Vector3d& turn_rad, const LearnedSources& learned) {
+  const auto turn = [](Pose& T_base_sensor, const Eigen::Vector3d& by_rad) {
+    T_base_sensor.rotation = (so3_exp(by_rad) * T_base_sensor.rotation).normalized();
+  };
+  for (LidarOptions& lidar : config.lidars)
+    turn(lidar.T_base_lidar, turn_rad);
+  for (std::size_t i = 0; i < config.motion_sources.size(); ++i) {
+    MotionSource& source = config.motion_sources[i];
+    if (source.of_lidar)
+      turn(source.T_base_source, turn_rad);
+    else if (source.kind == SourceKind::imu && source.calibration != Calibration::off && learned[i])
+      turn(source.T_base_source, daemon::observed_part(turn_rad, source, *learned[i]));
+  }
+}
+
 /// Converts calibration learned under one configuration to another with other extrinsics and lateness.
 LearnedSource seen_from(const MotionSource& configured, const MotionSource& used, LearnedSource learned) {
   if (configured.kind == SourceKind::imu) {
@@ -140,43 +172,67 @@ LearnedSource seen_from(const MotionSource& configured, const MotionSource& used
   return learned;
 }
 
+/// Rotates the lidars by what a pass has found.
+void follow_lidars(const Pass& played, const Findings& compared, const Config& configured, CalibratedDrive& drive) {
+  const std::optional<daemon::LidarTurn> found = daemon::turn_of_lidars(drive.config.motion_sources, compared);
+  if (!found)
+    return;
+  drive.lidars = found;
+  const Eigen::Vector3d total_rad = so3_log(so3_exp({found->rad[0].mean, found->rad[1].mean, found->rad[2].mean}) *
+                                            drive.config.lidars.front().T_base_lidar.rotation *
+                                            configured.lidars.front().T_base_lidar.rotation.conjugate());
+  for (std::size_t axis = 0; axis < drive.lidars->rad.size(); ++axis)
+    drive.lidars->rad[axis].mean = total_rad[static_cast<Eigen::Index>(axis)];
+  turn_lidars(drive.config, daemon::known_turn_rad(*found), played.learned);
+}
+
 } // namespace
 
 CalibratedDrive calibrate_by_drive(const Arguments& arguments, const ChosenRecording& chosen) {
-  CalibratedDrive drive{chosen.config, {}};
+  CalibratedDrive drive{chosen.config, {}, {}, {}};
   ProgressBar progress(!arguments.quiet);
   for (int pass = 0; pass < kPasses; ++pass) {
     const Pass played =
         replay(arguments, drive.config, chosen, [&](double done) { progress.show((pass + done) / kPasses); });
+    const Findings compared = findings_of(played);
     for (std::size_t i = 0; i < drive.config.motion_sources.size(); ++i) {
       MotionSource& source = drive.config.motion_sources[i];
       if (source.calibration == Calibration::off || source.of_lidar) // its packets cannot be advanced
         continue;
       if (played.learned[i])
         drive.learned[i] = seen_from(chosen.config.motion_sources[i], source, *played.learned[i]);
+      drive.compared[i] = compared[i];
+      if (compared[i])
+        drive.compared[i]->late_s.mean += 1e-3 * source.late_ms;
       const bool is_sure = source.calibration_sigma.late_ms == 0.0;
       const double coarse_ms =
           pass == 0 && !is_sure ? coarse_lateness_ms(played.rates.gyros[i], played.rates.estimated) : 0.0;
       if (coarse_ms == 0.0 && played.learned[i]) {
         MotionSource in_time = source;
         in_time.late_ms = 0.0;
-        MotionSourceOptions better = daemon::calibrated(in_time, *played.learned[i]);
-        better.late_ms += source.late_ms;
+        MotionSourceOptions better = daemon::calibrated(in_time, *played.learned[i], compared[i]);
+        better.late_ms = std::clamp(better.late_ms + source.late_ms, -kMostLate_ms, kMostLate_ms);
         static_cast<MotionSourceOptions&>(source) = std::move(better);
       } else {
         source.late_ms = std::clamp(source.late_ms + coarse_ms, -kMostLate_ms, kMostLate_ms);
       }
     }
+    follow_lidars(played, compared, chosen.config, drive);
   }
   return drive;
 }
 
-void write_calibration(OutputFile& file, const std::vector<MotionSource>& configured, const LearnedSources& learned) {
-  nlohmann::ordered_json sources = nlohmann::ordered_json::object();
-  for (std::size_t i = 0; i < configured.size(); ++i)
-    if (learned[i] && configured[i].calibration != Calibration::off)
-      sources[configured[i].name]["learned"] = daemon::learned_json(configured[i], *learned[i], true);
-  file.print("{}", daemon::calibration_yaml(sources));
+void write_calibration(OutputFile& file, const Config& configured, const CalibratedDrive& drive) {
+  nlohmann::ordered_json sources = nlohmann::ordered_json::object(), lidars = nlohmann::ordered_json::object();
+  for (std::size_t i = 0; i < configured.motion_sources.size(); ++i) {
+    const MotionSource& source = configured.motion_sources[i];
+    if (drive.learned[i] && source.calibration != Calibration::off)
+      sources[source.name]["learned"] = daemon::learned_json(source, *drive.learned[i], true, drive.compared[i]);
+  }
+  if (drive.lidars)
+    for (const LidarOptions& lidar : configured.lidars)
+      lidars[lidar.name]["learned"] = daemon::learned_json(lidar, *drive.lidars);
+  file.print("{}", daemon::calibration_yaml(sources, lidars));
   file.close();
 }
 

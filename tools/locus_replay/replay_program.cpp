@@ -121,7 +121,7 @@ void run(Arguments arguments, const SweepStage& stage, const EstimateObserver& o
   if (!arguments.calibrate.empty()) {
     OutputFile file(arguments.calibrate); // opened before the minutes of computing
     CalibratedDrive drive = calibrate_by_drive(arguments, chosen);
-    write_calibration(file, config.motion_sources, drive.learned);
+    write_calibration(file, config, drive);
     chosen.config = std::move(drive.config);
   }
   OpenRecording open = open_recording(arguments, chosen);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <iterator>
 #include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -69,6 +70,8 @@ std::vector<std::string> warnings_about(const PlayedRecording& played) {
   for (std::size_t i = 0; i < played.config.motion_sources.size(); ++i)
     if (const std::string doubt = daemon::calibration_warning(played.figures, i); !doubt.empty())
       lines.push_back(fmt::format("motion source {} {}", played.config.motion_sources[i].name, doubt));
+  if (std::string warning = daemon::lidar_mounting_warning(played.figures); !warning.empty())
+    lines.push_back(std::move(warning));
   if (const auto warning = daemon::too_fast(played.config.odometry.motion, played.figures.sweeps.largest_speed_mps))
     lines.push_back(*warning);
   return lines;

@@ -85,10 +85,12 @@ void reset(const CtlArguments& arguments) {
   send_request(arguments.control(), request);
 }
 
-/// Prints the estimated calibration of the motion sources, or the configuration with it.
+/// Prints the estimated calibration of the motion sources and lidars, or the configuration with it.
 void calibration(const CtlArguments& arguments) {
-  const Json sources = send_request(arguments.control(), {{"command", "status"}}).json.value("sources", Json::object());
-  fmt::print("{}", arguments.yaml ? daemon::calibration_yaml(sources) : daemon::calibration_text(sources));
+  const Json status = send_request(arguments.control(), {{"command", "status"}}).json;
+  const Json sources = status.value("sources", Json::object()), lidars = status.value("lidars", Json::object());
+  fmt::print("{}",
+             arguments.yaml ? daemon::calibration_yaml(sources, lidars) : daemon::calibration_text(sources, lidars));
 }
 
 /// Requests that an incident be recorded, and waits until it is written: the service answers earlier.
