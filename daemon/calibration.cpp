@@ -288,10 +288,6 @@ std::string line_of(std::string_view source, std::string_view figure, const orde
                      text_of(get("configured"), get("configured_sd")), text_of(get("value"), sd), verdict);
 }
 
-} // namespace
-
-namespace {
-
 /// Formats the lines of the table for a source or a lidar.
 std::string lines_of(const std::string& name, const ordered_json& learned) {
   std::string text;

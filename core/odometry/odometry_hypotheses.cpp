@@ -190,8 +190,8 @@ std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Contes
   const auto is_suspect = [&](std::optional<SourceId> source) {
     return contradiction && source && index_of(*source) == contradiction->source;
   };
-  const bool is_judged = is_forward_observed(observed_axes_);
-  if (may_slip(sweep, best.choice) || (is_judged && is_suspect(best.choice.translation)))
+  const bool observes_forward = is_forward_observed(observed_axes_);
+  if (may_slip(sweep, best.choice) || (observes_forward && is_suspect(best.choice.translation)))
     try_out({.without = repeating, .slips = true});
   if (!contradiction && !is_unusual())
     return std::nullopt;
@@ -202,13 +202,13 @@ std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Contes
     std::swap(suspects[0], suspects[1]);
   for (const std::optional<SourceId>& suspect : suspects) {
     const bool is_explained = (best.slips || (best.without & ~repeating).any()) && !is_unusual();
-    if (!suspect || is_explained || stop() || (!is_judged && suspect == best.choice.translation))
+    if (!suspect || is_explained || stop() || (!observes_forward && suspect == best.choice.translation))
       continue;
     Assumption assumption{.without = repeating};
     assumption.without.set(index_of(*suspect));
     try_out(assumption);
   }
-  if (!is_unusual() || stop() || !(suspects[0] || suspects[1]) || (!is_judged && best.choice.translation))
+  if (!is_unusual() || stop() || !(suspects[0] || suspects[1]) || (!observes_forward && best.choice.translation))
     return std::nullopt;
   Rival free = against(best, sweep, attempt(sweep, {.without = kAllSources}, filter_, stop));
   const double fits_better = free.lead() + prior_odds(sweep, best) - prior_odds(sweep, free.hypothesis);
