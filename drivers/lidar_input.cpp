@@ -412,15 +412,17 @@ std::uint64_t LidarInput::missing_before(const SensorClock::Reading& reading) co
     return sensor->packets_between(last_first_column_, reading.advance);
   if (const hesai::Decoder* const sensor = hesai(); sensor != nullptr && sensor->number())
     return sent_between(last_number_, *sensor->number());
-  const auto missing = std::llround(to_seconds(reading.advance - last_duration_) / to_seconds(nominal_duration()));
+  const double rounding = kRoundingCdeg / std::max(turn_of_packet_cdeg(), kRoundingCdeg);
+  const Duration skipped = std::max(last_duration_ - nominal_duration(), Duration{}); // known as well as the speed
+  const auto missing = std::llround((to_seconds(reading.advance - last_duration_) - rounding * to_seconds(skipped)) /
+                                    to_seconds(nominal_duration()));
   if (missing <= 0)
     return 0;
   if (reading.advance <= kLongestGapByAzimuth) {
     const double expected_cdeg = rotation_rate_rpm() / 60.0 * velodyne::kCdegPerTurn * to_seconds(reading.advance);
     const double turned_cdeg = packet_.first_azimuth_cdeg - last_azimuth_cdeg_;
     const double error_cdeg = std::remainder(turned_cdeg - expected_cdeg, velodyne::kCdegPerTurn);
-    const double tolerance = std::max(kSpeedTolerance, kRoundingCdeg / std::max(turn_of_packet_cdeg(), kRoundingCdeg));
-    if (std::abs(error_cdeg) > kAzimuthToleranceCdeg + tolerance * expected_cdeg)
+    if (std::abs(error_cdeg) > kAzimuthToleranceCdeg + std::max(kSpeedTolerance, rounding) * expected_cdeg)
       return 0;
   }
   return static_cast<std::uint64_t>(missing);
@@ -443,18 +445,20 @@ void LidarInput::count(const SensorClock::Reading& reading) {
 
 void LidarInput::count_lost(const SensorClock::Reading& reading) {
   const bool has_numbers = ouster() != nullptr || (hesai() != nullptr && hesai()->number());
-  std::uint64_t missing = missing_before(reading);
-  if (!has_numbers) {
-    const double cdeg_per_s = rotation_rate_rpm() / 60.0 * velodyne::kCdegPerTurn;
-    const double turned_cdeg = cdeg_per_s * to_seconds(reading.advance);
-    if (missing > 0 && turned_cdeg < velodyne::kCdegPerTurn)
-      missing = sectors_.lost_between(last_azimuth_cdeg_ + cdeg_per_s * to_seconds(last_duration_),
-                                      packet_.first_azimuth_cdeg, missing);
-    const bool skips_a_sector = 2 * packet_.duration > 3 * nominal_duration();
-    sectors_.add(packet_.first_azimuth_cdeg, skips_a_sector ? 0.0 : turn_of_packet_cdeg(), turned_cdeg);
-    counters_.lost -= std::min(counters_.lost, sectors_.withdraw_false_losses());
+  const std::uint64_t missing = missing_before(reading);
+  if (has_numbers) {
+    counters_.lost += missing;
+    return;
   }
-  counters_.lost += missing;
+  const double cdeg_per_s = rotation_rate_rpm() / 60.0 * velodyne::kCdegPerTurn;
+  const double turned_cdeg = cdeg_per_s * to_seconds(reading.advance);
+  const bool within_a_turn = missing > 0 && turned_cdeg < velodyne::kCdegPerTurn;
+  counters_.lost += within_a_turn ? sectors_.lost_between(last_azimuth_cdeg_ + cdeg_per_s * to_seconds(last_duration_),
+                                                          packet_.first_azimuth_cdeg, missing)
+                                  : missing;
+  const bool skips_a_sector = 2 * packet_.duration > 3 * nominal_duration();
+  sectors_.add(packet_.first_azimuth_cdeg, skips_a_sector ? 0.0 : turn_of_packet_cdeg(), turned_cdeg);
+  counters_.lost -= std::min(counters_.lost, sectors_.withdraw_false_losses()); // maybe also this gap
 }
 
 void LidarInput::store(const Datagram& datagram) {

@@ -128,11 +128,11 @@ TEST(LidarInput, Vls128StampsAreThoseOfItsFirstFiring) {
   EXPECT_EQ(packet->stamp + packet->duration, receive);
 }
 
-/// The packets of a VLP-16 at 600 rpm whose field of view leaves a sector out: blocks within the view, twelve to a
-/// packet.
+/// The packets of a VLP-16 whose field of view leaves a sector out: blocks within the view, twelve to a packet.
 class ViewOfSector {
  public:
-  ViewOfSector(double from_cdeg, double to_cdeg) : from_cdeg_(from_cdeg), to_cdeg_(to_cdeg) {}
+  ViewOfSector(double from_cdeg, double width_cdeg, double rpm = 600.0)
+      : from_cdeg_(from_cdeg), width_cdeg_(width_cdeg), cdeg_per_us_(rpm / 60.0 * velodyne::kCdegPerTurn * 1e-6) {}
 
   void show_all() { is_restricted_ = false; }
 
@@ -140,20 +140,22 @@ class ViewOfSector {
     constexpr double kBlock_us = 110.592;
     std::array<double, velodyne::kBlocks> us{};
     for (std::size_t block = 0; block < us.size(); next_us_ += kBlock_us) {
-      const double azimuth_cdeg = std::fmod(0.36 * next_us_, velodyne::kCdegPerTurn);
-      if (!is_restricted_ || azimuth_cdeg < from_cdeg_ || azimuth_cdeg >= to_cdeg_)
+      const double in_sector_cdeg =
+          std::fmod(cdeg_per_us_ * next_us_ - from_cdeg_ + velodyne::kCdegPerTurn, velodyne::kCdegPerTurn);
+      if (!is_restricted_ || in_sector_cdeg >= width_cdeg_)
         us[block++] = next_us_;
     }
     packet_.emplace(Model::vlp16, ReturnMode::strongest, static_cast<std::uint32_t>(std::lround(1e9 + us[0])));
     for (std::size_t block = 0; block < us.size(); ++block)
-      packet_->set_azimuth(block, static_cast<std::uint16_t>(std::fmod(0.36 * us[block], velodyne::kCdegPerTurn)));
+      packet_->set_azimuth(block,
+                           static_cast<std::uint16_t>(std::fmod(cdeg_per_us_ * us[block], velodyne::kCdegPerTurn)));
     packet_->set_all_returns(1000);
     return {packet_->payload(), kLidarIp, 2368, 2368,
             stamp_from_ns(1'700'000'000'000'000'000) + from_seconds(1e-6 * (next_us_ + 80.0))};
   }
 
  private:
-  double from_cdeg_, to_cdeg_;
+  double from_cdeg_, width_cdeg_, cdeg_per_us_;
   bool is_restricted_ = true;
   double next_us_ = 0.0;
   std::optional<VelodyneTestPacket> packet_;
@@ -161,10 +163,10 @@ class ViewOfSector {
 
 /// A field of view that is set on the lidar's page leaves sectors out; the packets that would fill them were lost.
 TEST(LidarInput, UnsentSectorsAreNotLost) {
-  for (const auto& [from_cdeg, to_cdeg] :
-       {std::pair{9'000.0, 27'000.0}, std::pair{4'500.0, 31'500.0}, std::pair{3'000.0, 4'200.0}}) {
+  for (const auto& [from_cdeg, width_cdeg] :
+       {std::pair{9'000.0, 18'000.0}, std::pair{4'500.0, 27'000.0}, std::pair{3'000.0, 1'200.0}}) {
     LidarInput lidar = opened();
-    ViewOfSector next(from_cdeg, to_cdeg);
+    ViewOfSector next(from_cdeg, width_cdeg);
     for (int i = 0; i < 1'500; ++i)
       EXPECT_NE(lidar.receive(next()), nullptr);
     EXPECT_EQ(lidar.counters().lost, 0U) << from_cdeg;
@@ -181,6 +183,19 @@ TEST(LidarInput, UnsentSectorsAreNotLost) {
     lidar.receive(next());
     EXPECT_EQ(lidar.counters().lost, lost + 3) << from_cdeg;
   }
+}
+
+/// Regression: the gap with which the view became known stayed lost if it was the first one between two packets.
+TEST(LidarInput, UnsentSectorsAreNotLostWhereverTheyLie) {
+  for (const double rpm : {300.0, 600.0, 1'200.0})
+    for (const double width_cdeg : {18'000.0, 27'000.0, 28'100.0})
+      for (double from_cdeg = 0.0; from_cdeg < velodyne::kCdegPerTurn; from_cdeg += 730.0) {
+        LidarInput lidar = opened();
+        ViewOfSector next(from_cdeg, width_cdeg, rpm);
+        for (int i = 0; i < 500; ++i)
+          EXPECT_NE(lidar.receive(next()), nullptr);
+        EXPECT_EQ(lidar.counters().lost, 0U) << rpm << " rpm, " << width_cdeg << " from " << from_cdeg;
+      }
 }
 
 TEST(LidarInput, GapOfStampAndAzimuthIsLoss) {
