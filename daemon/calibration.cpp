@@ -51,7 +51,7 @@ Turn mounting_of(const LearnedSource& source) {
   return {source.mounting_rad(0), source.mounting_rad(1), source.mounting_rad(2)};
 }
 
-ordered_json mounting_json(const Turn& learned, const Turn& configured) {
+ordered_json turn_json(const Turn& learned, const Turn& configured) {
   ordered_json json;
   for (std::size_t axis = 0; axis < learned.size(); ++axis) {
     const ordered_json figure = figure_json(learned[axis], configured[axis], kRadPerDeg);
@@ -81,12 +81,16 @@ Eigen::Vector3d known_turn_rad(const Turn& learned, const Turn& configured) {
 
 double rounded_to(double value, double parts) { return std::round(value * parts) / parts + 0.0; }
 
+} // namespace
+
 ordered_json mounting_json(const Pose& T_base_sensor) {
   const Eigen::Vector3d& p = T_base_sensor.translation;
   const Eigen::Vector3d rpy_deg = to_rpy_rad(T_base_sensor.rotation) / kRadPerDeg;
   return {{"xyz_m", {p.x(), p.y(), p.z()}},
           {"rpy_deg", {rounded_to(rpy_deg.x(), 100), rounded_to(rpy_deg.y(), 100), rounded_to(rpy_deg.z(), 100)}}};
 }
+
+namespace {
 
 /// Returns the keys in which two configurations of a source differ, with the values of the second.
 ordered_json changes_json(const MotionSourceOptions& before, const MotionSourceOptions& after) {
@@ -114,6 +118,13 @@ bool is_too_late(const MotionSourceOptions& source, const LearnedSource& learned
 }
 
 } // namespace
+
+std::optional<Pose> mounting_with(const MotionSourceOptions& imu, const std::optional<Eigen::Matrix3d>& gyro_axes) {
+  if (!gyro_axes || gyro_axes->determinant() < 0.0)
+    return std::nullopt;
+  return Pose{(Eigen::Quaterniond{*gyro_axes} * imu.T_base_source.rotation).normalized(),
+              imu.T_base_source.translation};
+}
 
 std::optional<OdometryFindings> findings_on(const Figures& figures, std::size_t source) {
   std::optional<OdometryFindings> found = figures.sweeps.compared[source];
@@ -152,7 +163,7 @@ ordered_json learned_json(const MotionSourceOptions& source, const LearnedSource
   ordered_json json;
   if (source.kind == SourceKind::imu) {
     json["late_ms"] = figure_json(learned.lateness_s(), configured.lateness_s(), 1e-3);
-    json["mounting_deg"] = mounting_json(mounting_of(learned), mounting_of(configured));
+    json["mounting_deg"] = turn_json(mounting_of(learned), mounting_of(configured));
   } else {
     json["late_ms"] = figure_json(lateness_s(source, compared), configured_lateness_s(source), 1e-3);
     json["scale"] = figure_json(learned.scale(), configured.scale(), 1.0, 1.0);
@@ -213,7 +224,7 @@ Eigen::Vector3d observed_part(Eigen::Vector3d turn_rad, const MotionSourceOption
 }
 
 ordered_json learned_json(const LidarOptions& lidar, const LidarTurn& turn) {
-  ordered_json json{{"mounting_deg", mounting_json(turn.rad, kUnknownTurns)}, {"calibrated", ordered_json::object()}};
+  ordered_json json{{"mounting_deg", turn_json(turn.rad, kUnknownTurns)}, {"calibrated", ordered_json::object()}};
   const Eigen::Vector3d turn_rad = known_turn_rad(turn);
   if (!turn_rad.isZero())
     json["calibrated"]["T_base_lidar"] =
@@ -342,6 +353,16 @@ bool is_of_lidars(const std::optional<LidarTurn>& lidars, std::size_t axis, doub
          std::abs(imu_turn_rad + lidars->rad[axis].mean) < kSameTurn_rad;
 }
 
+/// Describes a gyro whose axes are not those of its mounting.
+std::string axes_warning(const MotionSource& imu, const Eigen::Matrix3d& gyro_axes) {
+  const std::optional<Pose> T_base_source = mounting_with(imu, gyro_axes);
+  if (!T_base_source)
+    return "reports turns about axes that are mirrored, as by no mounting: its driver exchanges or reverses axes";
+  return fmt::format("turns as lidar does if it is mounted with T_base_source.rpy_deg: [{}]; configure that, unless "
+                     "T_base_lidar is wrong",
+                     fmt::join(mounting_json(*T_base_source)["rpy_deg"].get<std::vector<double>>(), ", "));
+}
+
 /// Describes an error in the stamps of a source; `late` is that beyond its configuration.
 std::string lateness_warning(const Learned& late, double configured_ms, bool too_late) {
   if (!significantly_exceeds(late, kGrossLateness_s))
@@ -376,6 +397,8 @@ std::string lidar_mounting_warning(const Figures& figures) {
 
 std::string calibration_warning(const Figures& figures, std::size_t source) {
   const MotionSource& options = figures.config.motion_sources[source];
+  if (const auto& axes = figures.ingest.sources[source].gyro_axes)
+    return axes_warning(options, *axes);
   if (options.calibration == Calibration::off)
     return "";
   if (options.kind == SourceKind::odometry) {

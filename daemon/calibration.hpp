@@ -16,6 +16,13 @@
 
 namespace locus::daemon {
 
+/// Formats a mounting as in the configuration. Any thread.
+nlohmann::ordered_json mounting_json(const Pose& T_base_sensor);
+
+/// Returns T_base_source of an IMU whose turns `gyro_axes` maps to those of the base; nothing if no mounting does.
+/// `gyro_axes`: HealthMonitor::gyro_axes(). Any thread.
+std::optional<Pose> mounting_with(const MotionSourceOptions& imu, const std::optional<Eigen::Matrix3d>& gyro_axes);
+
 /// Returns the comparison of an odometry with lidar, with the whole lateness: that which its configuration removes is
 /// included. Empty for an IMU and before the first sweep. Any thread.
 std::optional<OdometryFindings> findings_on(const Figures& figures, std::size_t source);
@@ -66,9 +73,10 @@ std::string calibration_text(const nlohmann::ordered_json& sources, const nlohma
 /// Any thread.
 std::string lidar_mounting_warning(const Figures& figures);
 
-/// Describes a significant, large error in the stamps of the source with this index or in the mounting of an IMU, and
-/// the remedy; phrased to follow the name of the source. Whether the source or the lidar is at fault is unknown, unless
-/// lidar_mounting_warning() describes the same rotation: then this is empty, as without such an error. Any thread.
+/// Describes a significant, large error in the stamps of the source with this index or in the mounting or the axes of
+/// an IMU, and the remedy; phrased to follow the name of the source. Whether the source or the lidar is at fault is
+/// unknown, unless lidar_mounting_warning() describes the same rotation: then this is empty, as without such an error.
+/// Any thread.
 std::string calibration_warning(const Figures& figures, std::size_t source);
 
 } // namespace locus::daemon

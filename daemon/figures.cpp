@@ -65,7 +65,8 @@ void IngestReport::read(const Ingest& ingest) {
                   .verdict = health.verdict(),
                   .period = health.period(),
                   .refusal = health.refusal().value_or(Refusal{}),
-                  .longest_refusal = health.longest_refusal()};
+                  .longest_refusal = health.longest_refusal(),
+                  .gyro_axes = health.gyro_axes()};
   }
   sweeps = ingest.sweeps().counters();
 }

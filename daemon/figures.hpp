@@ -65,6 +65,7 @@ struct IngestReport {
     std::optional<Duration> period{}; ///< HealthMonitor::period()
     Refusal refusal{};                ///< HealthMonitor::refusal(); default: none
     Refusal longest_refusal{};
+    std::optional<Eigen::Matrix3d> gyro_axes{}; ///< HealthMonitor::gyro_axes()
   };
 
   PacketCounters total;

@@ -137,8 +137,11 @@ ordered_json source_json(const Figures& figures, std::size_t i) {
   if (figures.live || !verdict.empty())
     json["verdict"] = verdict;
   const MotionSource& options = figures.config.motion_sources[i];
-  if (figures.sweeps.last && figures.sweeps.last->sources[i].learned && options.calibration != Calibration::off)
+  if (figures.sweeps.last && figures.sweeps.last->sources[i].learned && options.calibration != Calibration::off) {
     json["learned"] = learned_json(options, *figures.sweeps.last->sources[i].learned, false, findings_on(figures, i));
+    if (const auto T_base_source = mounting_with(options, source.gyro_axes))
+      json["learned"]["calibrated"] = {{"T_base_source", mounting_json(*T_base_source)}};
+  }
   if (const std::string warning = calibration_warning(figures, i); !warning.empty())
     json["calibration_warning"] = warning;
   if (figures.live && figures.sweeps.last) {

@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "core/base/options.hpp"
 #include "core/sources/motion_sample.hpp"
 #include "core/sources/registration_feedback.hpp"
@@ -43,6 +45,10 @@ class HealthMetric {
 
   /// Returns whether the specific force of an inertial source may be used.
   [[nodiscard]] virtual bool trusts_accelerometer() const { return true; }
+
+  /// Returns the matrix that maps the turns of a gyro with wrong axes to those of the base, if it is known. Its
+  /// determinant is -1 if no mounting explains them.
+  [[nodiscard]] virtual std::optional<Eigen::Matrix3d> gyro_axes() const { return std::nullopt; }
 
   /// Handles a loss of health: later samples need not be continuous with earlier ones.
   virtual void reset() {}

@@ -144,6 +144,13 @@ bool HealthMonitor::trusts_accelerometer() const {
   return std::ranges::all_of(metrics_, [](const auto& metric) { return metric->trusts_accelerometer(); });
 }
 
+std::optional<Eigen::Matrix3d> HealthMonitor::gyro_axes() const {
+  for (const auto& metric : metrics_)
+    if (const auto axes = metric->gyro_axes())
+      return axes;
+  return std::nullopt;
+}
+
 std::optional<Duration> HealthMonitor::period() const {
   constexpr std::uint64_t kEnough = 50;
   return counters_.received >= kEnough && period_s_ > 0.0 ? std::optional(from_seconds(period_s_)) : std::nullopt;

@@ -57,6 +57,8 @@ class HealthMonitor {
   /// Returns the finding about the source as a whole, in words for the user; empty if nothing is wrong.
   [[nodiscard]] std::string_view verdict() const;
   [[nodiscard]] bool trusts_accelerometer() const;
+  /// Returns HealthMetric::gyro_axes().
+  [[nodiscard]] std::optional<Eigen::Matrix3d> gyro_axes() const;
   /// Returns the present run of refused samples; empty while the source is healthy and before its first sample.
   [[nodiscard]] const std::optional<Refusal>& refusal() const { return refusal_; }
   /// Returns the longest run of refused samples so far, the present one included.

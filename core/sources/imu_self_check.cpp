@@ -16,10 +16,6 @@ constexpr double kGravityTolerance = 0.15; ///< relative; the robot may be accel
 constexpr double kEarlyTolerance = 0.3;    ///< relative, of the mean until then: a few samples of a shaking robot
 constexpr double kMaxTilt_deg = 60.0;      ///< no robot starts on a steeper slope
 
-/// Largest turn in a sweep that may be noise of lidar.
-constexpr double kTurns_rad = 0.4 * kRadPerDeg;
-/// Largest part of a turn about one axis that a mounting error of 8 degrees moves to another.
-constexpr double kLeaks = 0.15;
 /// Number of turning sweeps to quarantine a gyro, to use it again, and to judge it.
 constexpr int kSweepsToDoubt = 2, kSweepsToConfirm = 3, kSweepsToJudge = 10;
 constexpr int kRounds = 3; ///< quarantines until it is rejected although the cause is unclear
@@ -43,9 +39,9 @@ ImuSelfCheck::ImuSelfCheck(const Pose& T_base_imu, UseAcceleration use_accelerat
 }
 
 std::optional<HealthReason> ImuSelfCheck::judge(const SourceReading& reading) {
+  follow_turns(R_base_imu_ * reading.imu->angular_velocity_radps, reading.stamp);
   if (refused_)
     return HealthReason::self_check;
-  follow_turns(R_base_imu_ * reading.imu->angular_velocity_radps, reading.stamp);
   if (use_acceleration_ == UseAcceleration::automatic)
     weigh(R_base_imu_ * reading.imu->specific_force_mps2, reading.stamp);
   return refused_ || set_aside_ ? std::optional{HealthReason::self_check} : std::nullopt;
@@ -140,18 +136,55 @@ bool ImuSelfCheck::is_yet_to_be_used(const RegistrationFeedback& feedback) const
 }
 
 std::optional<HealthReason> ImuSelfCheck::on_feedback(LidarOpinion /*opinion*/, const RegistrationFeedback& feedback) {
-  if (refused_ || !covers(feedback.from) || !covers(feedback.to) || is_yet_to_be_used(feedback))
+  if (is_yet_to_be_used(feedback))
     return std::nullopt;
-  const bool was_set_aside = set_aside_;
-  compare(feedback);
-  review();
-  return refused_ || (set_aside_ && !was_set_aside) ? std::optional{HealthReason::self_check} : std::nullopt;
+  const bool was_refused = refused_, was_set_aside = set_aside_;
+  compare_axes(feedback);
+  if (!refused_ && covers(feedback.from) && covers(feedback.to)) {
+    compare(feedback);
+    review();
+  }
+  const bool is_lost = (refused_ && !was_refused) || (set_aside_ && !was_set_aside);
+  return is_lost ? std::optional{HealthReason::self_check} : std::nullopt;
+}
+
+/// Stores the sweep, and compares those whose turns the gyro's samples cover by now.
+void ImuSelfCheck::compare_axes(const RegistrationFeedback& feedback) {
+  if (feedback.observes[3] && feedback.observes[4] && feedback.observes[5]) {
+    if (seen_count_ == seen_.size()) {
+      oldest_seen_ = (oldest_seen_ + 1) % seen_.size();
+      --seen_count_;
+    }
+    const double elapsed_s = to_seconds(feedback.to - feedback.from);
+    seen_[(oldest_seen_ + seen_count_++) % seen_.size()] = {feedback.from, feedback.to,
+                                                            elapsed_s * feedback.twist_base.tail<3>()};
+  }
+  for (; seen_count_ > 0 && count_ > 0; --seen_count_) {
+    const Seen& seen = seen_[oldest_seen_];
+    if (by_age(0).stamp < seen.to + AxesCheck::kMostLate)
+      break;
+    compare_axes(seen);
+    oldest_seen_ = (oldest_seen_ + 1) % seen_.size();
+  }
+  if (axes_check_.is_wrong() && !refused_)
+    refuse("and lidar disagree on the axes about which the robot turns: those of the gyro are exchanged or reversed; "
+           "it is not used any more, until a restart (possible causes: T_base_source, the driver of the gyro, or "
+           "T_base_lidar)");
+}
+
+void ImuSelfCheck::compare_axes(const Seen& seen) {
+  if (!covers(seen.from - AxesCheck::kMostLate) || seen.from >= seen.to)
+    return;
+  AxesCheck::GyroTurns gyro_rad;
+  for (std::size_t i = 0; i < gyro_rad.size(); ++i)
+    gyro_rad[i] = angle_rad_at(seen.to + AxesCheck::late(i)) - angle_rad_at(seen.from + AxesCheck::late(i));
+  axes_check_.add(seen.lidar_rad, gyro_rad, to_seconds(seen.to - seen.from));
 }
 
 void ImuSelfCheck::compare(const RegistrationFeedback& feedback) {
   const Eigen::Vector3d gyro_rad = angle_rad_at(feedback.to) - angle_rad_at(feedback.from);
   const Eigen::Vector3d lidar_rad = to_seconds(feedback.to - feedback.from) * feedback.twist_base.tail<3>();
-  const double noise_rad = std::max(kTurns_rad, kLeaks * std::max(gyro_rad.norm(), lidar_rad.norm()));
+  const double noise_rad = AxesCheck::noise_rad(gyro_rad, lidar_rad);
   for (std::size_t i = 0; i < turns_.size(); ++i) {
     const auto axis = static_cast<Eigen::Index>(i);
     const bool turned = std::max(std::abs(gyro_rad[axis]), std::abs(lidar_rad[axis])) > noise_rad;
@@ -171,7 +204,7 @@ double ImuSelfCheck::Turns::likeness() const { return gyro_lidar / std::sqrt(gyr
 
 /// Classifies the difference. A gyro that hardly reports turns gives no further evidence.
 ImuSelfCheck::Difference ImuSelfCheck::Turns::difference() const {
-  if (gyro_gyro < sweeps * kTurns_rad * kTurns_rad)
+  if (gyro_gyro < sweeps * AxesCheck::kNoise_rad * AxesCheck::kNoise_rad)
     return Difference::gyro_still;
   if (likeness() < -kLikeness)
     return Difference::opposite;
@@ -253,10 +286,12 @@ std::string_view ImuSelfCheck::words(Difference difference, std::size_t axis, bo
   return all[static_cast<std::size_t>(difference)][axis][for_good ? 1 : 0];
 }
 
-/// Restarts the check: a source that comes back is checked as at the start.
+/// Restarts the check: a source that comes back is checked as at the start. Evidence on the axes is dropped, too: lidar
+/// follows a gyro as long as it is used.
 void ImuSelfCheck::reset() {
   if (refused_)
     return;
+  axes_check_ = {};
   if (!set_aside_)
     turns_ = {};
   was_lost_ = true;
@@ -270,6 +305,8 @@ void ImuSelfCheck::reset() {
 }
 
 void ImuSelfCheck::refuse(std::string_view verdict) {
+  if (!axes_check_.is_wrong())
+    axes_check_ = {};
   refused_ = true;
   verdict_ = verdict;
 }

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string_view>
 
+#include "core/sources/axes_check.hpp"
 #include "core/sources/health_metric.hpp"
 
 namespace locus {
@@ -19,9 +20,10 @@ namespace locus {
 /// because it would distort the sweeps; lidar without it decides whether it is used again or rejected. While the robot
 /// goes straight nothing is proven and nothing is distorted.
 ///
-/// Accelerations in a wrong unit are not used, the gyro still is. A unit that continues to disagree with lidar is
-/// rejected until a restart. verdict() describes the observation in plain words, with possible causes: it is not known
-/// which of the two is right, since people who walk around a standing robot mislead lidar. One owner.
+/// Accelerations in a wrong unit are not used, the gyro still is. A unit that continues to disagree with lidar, or
+/// whose axes are not those of its mounting (AxesCheck), is rejected until a restart. verdict() describes the
+/// observation in plain words, with possible causes: it is not known which of the two is right, since people who walk
+/// around a standing robot mislead lidar. One owner.
 class ImuSelfCheck : public HealthMetric {
  public:
   ImuSelfCheck(const Pose& T_base_imu, UseAcceleration use_acceleration);
@@ -35,6 +37,8 @@ class ImuSelfCheck : public HealthMetric {
   /// Returns false, until gravity has been weighed, if the mean so far cannot be gravity: forces in another unit look
   /// like free fall.
   [[nodiscard]] bool trusts_accelerometer() const override;
+  /// Also found of a unit that is rejected.
+  [[nodiscard]] std::optional<Eigen::Matrix3d> gyro_axes() const override { return axes_check_.axes(); }
 
  private:
   /// Observed difference between gyro and lidar.
@@ -44,6 +48,11 @@ class ImuSelfCheck : public HealthMetric {
   struct Turned {
     Stamp stamp;
     Eigen::Vector3d angle_rad; ///< base axes
+  };
+  /// Turn that lidar has measured, until the gyro's samples cover it for all delays of its stamps.
+  struct Seen {
+    Stamp from, to;
+    Eigen::Vector3d lidar_rad = Eigen::Vector3d::Zero();
   };
   /// Turns about one axis, measured by gyro and lidar.
   struct Turns {
@@ -65,6 +74,8 @@ class ImuSelfCheck : public HealthMetric {
   [[nodiscard]] bool covers(Stamp stamp) const;
   [[nodiscard]] Eigen::Vector3d angle_rad_at(Stamp stamp) const;
   [[nodiscard]] bool is_yet_to_be_used(const RegistrationFeedback& feedback) const;
+  void compare_axes(const RegistrationFeedback& feedback);
+  void compare_axes(const Seen& seen);
   void compare(const RegistrationFeedback& feedback);
   void review();
   void conclude();
@@ -83,7 +94,7 @@ class ImuSelfCheck : public HealthMetric {
   Eigen::Vector3d force_sum_mps2_ = Eigen::Vector3d::Zero(); ///< base axes
   double forces_ = 0.0;
 
-  std::array<Turned, 128> turned_; ///< ring
+  std::array<Turned, 256> turned_; ///< ring
   std::size_t newest_ = 0, count_ = 0;
   Eigen::Vector3d angle_rad_ = Eigen::Vector3d::Zero();
   std::optional<Stamp> last_;
@@ -92,6 +103,9 @@ class ImuSelfCheck : public HealthMetric {
   std::array<Turns, 3> turns_;      ///< by axis of the base
   bool set_aside_ = false;
   int rounds_ = 0; ///< quarantines without a result
+  AxesCheck axes_check_;
+  std::array<Seen, 16> seen_; ///< queue
+  std::size_t oldest_seen_ = 0, seen_count_ = 0;
 };
 
 } // namespace locus

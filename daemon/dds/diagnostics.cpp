@@ -92,8 +92,9 @@ std::vector<Diagnostic> diagnostics(const Figures& figures, Stamp now) {
   for (std::size_t i = 0; i < figures.config.motion_sources.size(); ++i) {
     const std::string& name = figures.config.motion_sources[i].name;
     const IngestReport::Source& source = figures.ingest.sources[i];
-    const std::string fault =
-        source.healthy ? calibration_warning(figures, i) : verdict_on(source, figures.live.has_value());
+    std::string fault = source.healthy ? "" : verdict_on(source, figures.live.has_value());
+    if (source.healthy || source.gyro_axes)
+      fault += (fault.empty() ? "" : "; ") + calibration_warning(figures, i);
     all.push_back(diagnostic(source.healthy && fault.empty() ? Level::ok : Level::warning, ": source " + name,
                              fault.empty() ? std::string{health_of(source)} : fault, json["sources"][name]));
   }

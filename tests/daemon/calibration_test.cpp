@@ -42,6 +42,20 @@ TEST(Calibration, GrossErrorIsReportedWithItsSize) {
   EXPECT_NE(doubt_of_gyro(0, {0, 0, 90}).find("+90.0 degrees about z (yaw)"), std::string::npos);
 }
 
+TEST(Calibration, ExchangedAxesAreReportedWithTheMountingToConfigure) {
+  Config config;
+  config.motion_sources = {{{"source", SourceKind::imu, {}}, "", ""}};
+  config.motion_sources[0].T_base_source.rotation = from_rpy_rad({0, 0, -90 * kRadPerDeg});
+  Figures figures{.config = config};
+  const Eigen::Matrix3d half_turn = Eigen::Vector3d{-1, -1, 1}.asDiagonal(),
+                        mirrored = Eigen::Vector3d{1, -1, 1}.asDiagonal();
+  figures.ingest.sources[0].gyro_axes = half_turn;
+  EXPECT_NE(calibration_warning(figures, 0).find("T_base_source.rpy_deg: [0, 0, 90]"), std::string::npos)
+      << calibration_warning(figures, 0);
+  figures.ingest.sources[0].gyro_axes = mirrored;
+  EXPECT_NE(calibration_warning(figures, 0).find("its driver"), std::string::npos) << calibration_warning(figures, 0);
+}
+
 TEST(Calibration, SmallErrorIsNotReported) {
   EXPECT_EQ(doubt_of_gyro(0.014, {2.9, -2.9, 2.9}), "");
   EXPECT_EQ(doubt_of_gyro(-0.029), "");

@@ -71,6 +71,33 @@ TEST(WrongImuCalibration, MountingWrongByDegreesIsReported) {
   }
 }
 
+/// An IMU that is configured a quarter turn off exchanges roll and pitch. It used to be believed: the drive ended
+/// metres off without a word.
+TEST(WrongImuCalibration, ExchangedAxesAreReportedWithTheRightMounting) {
+  const double without_m = ape_mean_m(replay_of_walk({"--fail", "imu:lost@0"}));
+  for (const std::string configured : {"[0,0,90]", "[180,0,0]"}) {
+    SCOPED_TRACE(configured);
+    const std::string mounting = "motion_sources.imu.T_base_source.rpy_deg=" + configured;
+    const Replay turned = replay_of_walk({"--set", mounting});
+    EXPECT_NE(turned.run().err.find("motion source imu turns as lidar does if it is mounted with "
+                                    "T_base_source.rpy_deg: [0, 0, 0]"),
+              std::string::npos)
+        << turned.run().err;
+    EXPECT_LT(ape_mean_m(turned), 1.2 * without_m + 0.01);
+  }
+  const TemporaryFolder folder;
+  const Replay calibrated = walk().replay(
+      {"--set", "motion_sources.imu.T_base_source.rpy_deg=[0,0,-90]", "--calibrate", folder / "found.yaml"});
+  EXPECT_EQ(calibrated.run().err.find("motion source imu"), std::string::npos) << calibrated.run().err;
+  YAML::Node found;
+  for (const YAML::Node& source : YAML::LoadFile(folder / "found.yaml")["motion_sources"])
+    if (source["name"].as<std::string>() == "imu")
+      found = source["T_base_source"]["rpy_deg"];
+  ASSERT_TRUE(found.IsSequence());
+  for (int axis = 0; axis < 3; ++axis)
+    EXPECT_NEAR(found[axis].as<double>(), 0.0, 2.0) << axis;
+}
+
 /// `report` estimates and reports the calibration without applying it.
 TEST(WrongImuCalibration, ReportAloneChangesNothing) {
   const auto replay = [](const std::string& mode) {

@@ -45,6 +45,7 @@ struct Rates {
 struct Pass {
   LearnedSources learned; ///< with the time each was last received
   std::array<std::optional<daemon::OdometryComparison>, kMaxSources> comparisons;
+  std::array<std::optional<Eigen::Matrix3d>, kMaxSources> gyro_axes; ///< HealthMonitor::gyro_axes()
   Rates rates;
 };
 
@@ -80,6 +81,8 @@ Pass replay(const Arguments& arguments, Config config, ChosenRecording chosen, c
     if (gyro.empty() || gyro.back().stamp < imu->sample.stamp)
       gyro.push_back({imu->sample.stamp, imu->sample.angular_velocity_radps});
   }
+  for (std::size_t i = 0; i < config.motion_sources.size(); ++i)
+    pass.gyro_axes[i] = pipeline.ingest().sources().health(SourceId{i}).gyro_axes();
   return pass;
 }
 
@@ -189,7 +192,7 @@ void follow_lidars(const Pass& played, const Findings& compared, const Config& c
 } // namespace
 
 CalibratedDrive calibrate_by_drive(const Arguments& arguments, const ChosenRecording& chosen) {
-  CalibratedDrive drive{chosen.config, {}, {}, {}};
+  CalibratedDrive drive{chosen.config, chosen.config, {}, {}, {}};
   ProgressBar progress(!arguments.quiet);
   for (int pass = 0; pass < kPasses; ++pass) {
     const Pass played =
@@ -199,15 +202,18 @@ CalibratedDrive calibrate_by_drive(const Arguments& arguments, const ChosenRecor
       MotionSource& source = drive.config.motion_sources[i];
       if (source.calibration == Calibration::off || source.of_lidar) // its packets cannot be advanced
         continue;
-      if (played.learned[i])
-        drive.learned[i] = seen_from(chosen.config.motion_sources[i], source, *played.learned[i]);
+      const std::optional<Pose> remounted = daemon::mounting_with(source, played.gyro_axes[i]);
+      if (remounted)
+        source.T_base_source = drive.start.motion_sources[i].T_base_source = *remounted;
+      else if (played.learned[i])
+        drive.learned[i] = seen_from(drive.start.motion_sources[i], source, *played.learned[i]);
       drive.compared[i] = compared[i];
       if (compared[i])
         drive.compared[i]->late_s.mean += 1e-3 * source.late_ms;
       const bool is_sure = source.calibration_sigma.late_ms == 0.0;
       const double coarse_ms =
           pass == 0 && !is_sure ? coarse_lateness_ms(played.rates.gyros[i], played.rates.estimated) : 0.0;
-      if (coarse_ms == 0.0 && played.learned[i]) {
+      if (coarse_ms == 0.0 && played.learned[i] && !remounted) {
         MotionSource in_time = source;
         in_time.late_ms = 0.0;
         MotionSourceOptions better = daemon::calibrated(in_time, *played.learned[i], compared[i]);
@@ -225,9 +231,13 @@ CalibratedDrive calibrate_by_drive(const Arguments& arguments, const ChosenRecor
 void write_calibration(OutputFile& file, const Config& configured, const CalibratedDrive& drive) {
   nlohmann::ordered_json sources = nlohmann::ordered_json::object(), lidars = nlohmann::ordered_json::object();
   for (std::size_t i = 0; i < configured.motion_sources.size(); ++i) {
-    const MotionSource& source = configured.motion_sources[i];
-    if (drive.learned[i] && source.calibration != Calibration::off)
-      sources[source.name]["learned"] = daemon::learned_json(source, *drive.learned[i], true, drive.compared[i]);
+    const MotionSource& source = drive.start.motion_sources[i];
+    if (!drive.learned[i] || source.calibration == Calibration::off)
+      continue;
+    nlohmann::ordered_json& learned = sources[source.name]["learned"];
+    learned = daemon::learned_json(source, *drive.learned[i], true, drive.compared[i]);
+    if (source.T_base_source != configured.motion_sources[i].T_base_source)
+      learned["calibrated"].emplace("T_base_source", daemon::mounting_json(source.T_base_source));
   }
   if (drive.lidars)
     for (const LidarOptions& lidar : configured.lidars)

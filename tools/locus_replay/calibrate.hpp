@@ -17,7 +17,8 @@ namespace locus::tools {
 /// Estimates from a drive of the lateness, mounting and scale of its motion sources and of the rotation of its lidars.
 struct CalibratedDrive {
   Config config;          ///< of the recording, updated by the significant estimates
-  LearnedSources learned; ///< relative to that of the recording, like the other two
+  Config start;           ///< of the recording, with IMUs whose axes were exchanged or reversed mounted as they are
+  LearnedSources learned; ///< relative to `start`, like the other two
   std::array<std::optional<daemon::OdometryFindings>, kMaxSources> compared; ///< by source
   std::optional<daemon::LidarTurn> lidars;
 };

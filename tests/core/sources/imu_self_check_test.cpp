@@ -153,6 +153,18 @@ TEST_F(ImuSelfCheckTest, GyroContradictedOnOneAxisIsQuarantinedAfterTwoSweeps) {
   EXPECT_NE(check.verdict().find("other way"), std::string_view::npos);
 }
 
+/// A unit that is mounted sideways is rejected about one axis after the other; its axes are found all the same.
+TEST_F(ImuSelfCheckTest, AxesOfARejectedUnitAreFound) {
+  ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
+  for (int round = 0; round < 8; ++round)
+    for (const Eigen::Vector3d& lidar : {Eigen::Vector3d{0.3, 0, 0}, {0, 0.3, 0}, {0, 0, 0.3}})
+      turn(check, 10, {lidar.y(), -lidar.x(), lidar.z()}, lidar);
+  EXPECT_TRUE(refused_);
+  ASSERT_TRUE(check.gyro_axes());
+  EXPECT_TRUE(check.gyro_axes()->isApprox(from_rpy_rad({0, 0, std::numbers::pi / 2}).toRotationMatrix(), 1e-9))
+      << *check.gyro_axes();
+}
+
 /// A mounting error of some degrees is for the calibration: fast turns in yaw that it moves to other axes used to
 /// quarantine the gyro, and nothing was calibrated.
 TEST_F(ImuSelfCheckTest, GyroMisalignedByDegreesIsNotQuarantined) {

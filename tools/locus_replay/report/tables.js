@@ -96,6 +96,9 @@ export function sources(section) {
         if (source.verdict) {
           reasons.push(source.verdict);
         }
+        if (source.calibration_warning) {
+          reasons.push(source.calibration_warning);
+        }
         return [
           name, count(source.received), count(source.used_sweeps), mishap(source.health_changes),
           reasons.length > 0 ? {text: `▲ ${reasons.join(", ")}`, warning: true} : "none"
