@@ -21,8 +21,9 @@ constexpr double kAngularAcceleration_radps2 = 20.0; ///< standard deviation of 
 /// Prior standard deviations of the slow common states, m/s^2.
 constexpr double kAccelerometerBias = 0.1, kGravityError = 0.2;
 
-/// Prior variance of the lidar extrinsics (5 mm, 2 mrad). Considered, not estimated.
-const Vector6 kMountingOfLidar = squares(0.005, 0.002);
+/// Prior variance of the lidar extrinsics, per axis: brackets, drawings and a spirit level leave half a degree and a
+/// centimetre in all. Considered, not estimated.
+const Vector6 kMountingOfLidar = squares(0.006, 0.005);
 
 const Vector6 kFirst = squares(0.003, 3e-4); ///< alignment variance of the first sweep of the map
 const Vector6 kFloor = squares(0.001, 1e-4); ///< least pose variance against the submap: surfaces are known no better

@@ -71,7 +71,8 @@ TEST(Odometry, WheelsBridgeABareCorridorWithGrowingSigma) {
   EXPECT_LT(late.observability[0], 0.01);
   EXPECT_GT(late.observability[1], 0.1);
   EXPECT_GT(sigma_m(late, 0), 10 * sigma_m(early, 0));
-  EXPECT_LT(sigma_m(late, 1), 0.1);
+  const double mounting_m = 0.005 * driven_m; // standard deviation of the lidar's mounting: it bends the path
+  EXPECT_LT(std::sqrt(late.pose_covariance(1, 1) - mounting_m * mounting_m), 0.05) << "the walls are seen";
   EXPECT_LT(result.worst_error_m, 3 * sigma_m(late, 0));
 }
 
