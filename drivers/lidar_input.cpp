@@ -14,6 +14,9 @@ namespace locus {
 namespace {
 
 constexpr Duration kSenderTimeout = std::chrono::seconds{1};
+/// Time after which an unused PPS is worth reporting, and after which it counts as used again: a receiver sends a good
+/// sentence among bad ones.
+constexpr Duration kLasts = std::chrono::seconds{5};
 constexpr Duration kLongestGapByAzimuth = std::chrono::seconds{1};
 constexpr double kAzimuthToleranceCdeg = 100.0;
 constexpr double kSpeedTolerance = 0.02; ///< relative change of the motor's speed over a gap
@@ -202,8 +205,12 @@ void LidarInput::process_position(const Datagram& datagram) {
   position_ = velodyne::parse_position_packet(datagram.payload.first<velodyne::kPositionPacketBytes>());
   clock_.set_synchronised(position_->is_synchronised());
   const std::string_view why = options_.time != LidarTime::receive ? velodyne::why_unused(*position_) : "";
-  if (why != std::exchange(pps_unused_for_, why))
+  if (why.empty())
+    pps_used_since_ = pps_used_since_.value_or(datagram.receive_stamp);
+  else if (pps_used_since_.reset(); why != std::exchange(pps_unused_for_, why))
     pps_unused_since_ = datagram.receive_stamp;
+  if (pps_used_since_ && datagram.receive_stamp - *pps_used_since_ > kLasts)
+    pps_unused_for_ = {};
   ++counters_.position;
 }
 
@@ -336,8 +343,7 @@ std::string_view LidarInput::clock_state() const {
 }
 
 std::string_view LidarInput::why_pps_is_unused() const {
-  constexpr Duration kWorthReporting = std::chrono::seconds{5};
-  return last_received_ - pps_unused_since_ > kWorthReporting ? pps_unused_for_ : std::string_view{};
+  return last_received_ - pps_unused_since_ > kLasts ? pps_unused_for_ : std::string_view{};
 }
 
 double LidarInput::rotation_rate_rpm() const {

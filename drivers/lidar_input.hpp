@@ -166,8 +166,9 @@ class LidarInput {
   const LidarPacket* ready_ = nullptr; ///< decoded from the current datagram
   PacketCounters counters_;
   std::optional<velodyne::PositionPacket> position_;
-  std::string_view pps_unused_for_; ///< velodyne::why_unused() of position_
+  std::string_view pps_unused_for_; ///< velodyne::why_unused() of the last position packet that was not used
   Stamp pps_unused_since_;
+  std::optional<Stamp> pps_used_since_;            ///< empty while it is not used
   TimeScale time_scale_ = TimeScale::free_running; ///< only for packets that carry the date
   UnknownPackets unknown_other_;                   ///< the latest packets rejected as another maker's or model's
   std::array<ImuSample, ouster::ImuMeasurements::kMost> imu_samples_;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <optional>
 #include <random>
 #include <string>
@@ -268,33 +269,51 @@ TEST(LidarInput, ClockBeyondTheHourCostsOnePacket) {
   EXPECT_EQ(lidar.counters().clock_steps, 0U);
 }
 
-/// Position packets with a locked PPS for so long, and data packets between them.
-std::string_view why_unused_after(Duration duration, const std::string& nmea, LidarTime time = LidarTime::automatic) {
+/// Position packets with a locked PPS for so long, and data packets between them. `nmea`: sentence at a time from the
+/// start.
+using Sentence = std::function<std::string(Duration)>;
+std::string_view why_unused_after(Duration duration, const Sentence& nmea, LidarTime time = LidarTime::automatic) {
   LidarOptions options;
   options.time = time;
   LidarInput lidar = std::move(*LidarInput::open(options, 0));
   Stream stream;
   std::array<std::byte, velodyne::kPositionPacketBytes> position{};
   position[0xCA] = std::byte{2};
-  std::memcpy(&position[0xCE], nmea.data(), nmea.size());
   const Stamp begin = stream(0).receive_stamp;
   for (int i = 0;; ++i) {
     const Datagram data = stream(i);
     lidar.receive(data);
+    const std::string sentence = nmea(data.receive_stamp - begin);
+    std::memcpy(&position[0xCE], sentence.data(), sentence.size());
     lidar.receive({position, kLidarIp, 8308, 8308, data.receive_stamp});
     if (data.receive_stamp - begin > duration)
       return lidar.why_pps_is_unused();
   }
 }
 
+const std::string kRmc = "$GPRMC,220243,A,3708.5809,N,12139.7813,W,028.8,158.3,111212,013.8,E,D*03\r\n";
+
 TEST(LidarInput, UnusedLockedPpsIsReportedAfterFiveSeconds) {
-  const std::string gga = "$GPGGA,220243,3708.5809,N*00";
+  const Sentence gga = [](Duration) { return "$GPGGA,220243,3708.5809,N*00"; };
   EXPECT_EQ(why_unused_after(std::chrono::seconds{4}, gga), "");
   EXPECT_NE(why_unused_after(std::chrono::seconds{6}, gga).find("no RMC"), std::string_view::npos);
   EXPECT_EQ(why_unused_after(std::chrono::seconds{6}, gga, LidarTime::receive), "") << "configured so";
-  EXPECT_EQ(why_unused_after(std::chrono::seconds{6},
-                             "$GPRMC,220243,A,3708.5809,N,12139.7813,W,028.8,158.3,111212,013.8,E,D*03\r\n"),
-            "");
+  EXPECT_EQ(why_unused_after(std::chrono::seconds{6}, [](Duration) { return kRmc; }), "");
+}
+
+/// Regression: a checksum that is right by chance, once in a few seconds, hid all wrong ones.
+TEST(LidarInput, GoodSentenceAmongBadOnesDoesNotHideThem) {
+  const auto is_good = [](Duration since) { return since / std::chrono::seconds{1} % 3 == 2; };
+  const Sentence mostly_bad = [&](Duration since) {
+    std::string sentence = kRmc;
+    sentence[sentence.find('*') + 1] = is_good(since) ? '0' : '7';
+    return sentence;
+  };
+  EXPECT_NE(why_unused_after(std::chrono::seconds{9}, mostly_bad).find("checksums"), std::string_view::npos);
+  const Sentence bad_at_first = [&](Duration since) {
+    return since < std::chrono::seconds{6} ? mostly_bad(Duration{}) : kRmc;
+  };
+  EXPECT_EQ(why_unused_after(std::chrono::seconds{12}, bad_at_first), "");
 }
 
 TEST(LidarInput, FirstSenderIsTheLidarUntilItFallsSilent) {
