@@ -207,7 +207,7 @@ Input LiveInput::pop_cloud(std::size_t lidar, Stamp arrival) {
   const auto index = static_cast<std::uint8_t>(lidar);
   if (cloud.too_large)
     return CloudInput{index, nullptr, arrival, CloudError::too_large};
-  const auto message = read_cloud({cloud.bytes, Serialisation::cdr}, kPointCloudType);
+  const auto message = read_cloud({cloud.bytes, Serialisation::cdr}, cloud.type);
   if (!message)
     return CloudInput{index, nullptr, arrival, CloudError::cut};
   cloud_ = *message;

@@ -49,12 +49,13 @@ struct CloudInput {
   CloudError error{};
 };
 
-/// Serialised sensor_msgs/PointCloud2 with encapsulation, on its way to the ingest.
+/// Serialised cloud with encapsulation, on its way to the ingest.
 struct CloudBytes {
   static constexpr std::size_t kMaxBytes = 64'000'000; ///< longer messages are rejected
 
   Stamp arrival;
-  bool too_large = false; ///< `bytes` is then empty
+  std::string_view type = kPointCloudType; ///< as of read_cloud(); static
+  bool too_large = false;                  ///< `bytes` is then empty
   std::vector<std::byte> bytes;
 };
 

@@ -212,8 +212,8 @@ class Admission {
   }
   [[nodiscard]] std::uint64_t refused() const { return refused_; }
 
-  /// Lets another writer take over if `reader` no longer matches the current one.
-  template <class Message> void update_owner(const DdsReader<Message>& reader) {
+  /// Lets another writer take over if `reader` (DdsReader or CloudReader) no longer matches the current one.
+  template <class Reader> void update_owner(const Reader& reader) {
     if (!reader.is_matched(writer_))
       last_received_ = {};
   }

@@ -8,7 +8,9 @@
 
 #include <pthread.h>
 
+#include "daemon/dds/cloud_reader.hpp"
 #include "daemon/dds/dds_node.hpp"
+#include "daemon/dds/publications.hpp"
 #include "daemon/machine_time.hpp"
 
 namespace locus::daemon {
@@ -37,7 +39,7 @@ struct RosLink::Session {
   };
   struct CloudLidar {
     std::uint8_t lidar;
-    DdsReader<ros::PointCloud2> reader;
+    CloudReader reader;
     Admission admission;
     std::uint64_t received = 0;
   };
@@ -51,7 +53,8 @@ struct RosLink::Session {
     Admission admission;
   };
 
-  Session(DdsNode node_, const Config& config, const RosNode& ros_node) : node(std::move(node_)) {
+  Session(DdsNode node_, const Config& config, RosNode ros_node_)
+      : node(std::move(node_)), ros_node(std::move(ros_node_)), ros_graph(config.dds.ros_graph) {
     const DdsOptions& dds = config.dds;
     odometry = {node, dds.prefix + "/odometry", TopicQos::standard()};
     odometry_fast = {node, dds.prefix + "/odometry_fast", TopicQos::standard()};
@@ -66,17 +69,13 @@ struct RosLink::Session {
     if (dds.publish_map)
       map.emplace(node, dds.prefix + "/map", TopicQos::latch());
     listen(config);
-    graph = announce(ros_node, node, dds.ros_graph);
+    graph = announce(ros_node, node, ros_graph);
   }
 
   void listen(const Config& config) {
     waitset = DdsEntity{dds_create_waitset(node.participant())};
     idle_condition = DdsEntity{dds_create_guardcondition(node.participant())};
     dds_waitset_attach(waitset.handle(), idle_condition.handle(), 0);
-    const auto attach = [this](dds_entity_t reader) {
-      dds_set_status_mask(reader, DDS_DATA_AVAILABLE_STATUS);
-      dds_waitset_attach(waitset.handle(), reader, 0);
-    };
     for (std::size_t i = 0; i < config.lidars.size(); ++i) {
       if (config.lidars[i].gives_clouds())
         attach(cloud_lidars
@@ -84,6 +83,8 @@ struct RosLink::Session {
                        static_cast<std::uint8_t>(i), {node, config.lidars[i].topic, TopicQos::cloud_in()}, {}})
                    .reader.handle());
     }
+    if (!cloud_lidars.empty())
+      attach(publications.emplace(node).handle());
     for (std::size_t i = 0; i < config.motion_sources.size(); ++i) {
       const MotionSource& source = config.motion_sources[i];
       if (!source.topic.empty() && source.kind == SourceKind::imu)
@@ -102,7 +103,29 @@ struct RosLink::Session {
                  .reader.handle());
   }
 
+  void attach(dds_entity_t reader) const {
+    dds_set_status_mask(reader, DDS_DATA_AVAILABLE_STATUS);
+    dds_waitset_attach(waitset.handle(), reader, 0);
+  }
+
+  /// Changes the type of the clouds on a topic to the one that is published.
+  void follow_publications() {
+    if (!publications)
+      return;
+    publications->take([this](const std::string& topic, std::string_view type) {
+      for (CloudLidar& lidar : cloud_lidars)
+        lidar.reader.discover(topic, type);
+    });
+    for (CloudLidar& lidar : cloud_lidars)
+      if (lidar.reader.follow(node)) {
+        attach(lidar.reader.handle());
+        graph = announce(ros_node, node, ros_graph);
+      }
+  }
+
   DdsNode node; ///< first member: outlives its endpoints
+  RosNode ros_node;
+  RosGraph ros_graph;
   DdsWriter<ros::Odometry> odometry, odometry_fast;
   DdsWriter<ros::UInt8> state, resets;
   DdsWriter<ros::DiagnosticArray> diagnostics, beginning;
@@ -113,6 +136,7 @@ struct RosLink::Session {
   std::vector<ImuSource> imus;
   std::vector<OdometrySource> odometries;
   std::vector<CloudLidar> cloud_lidars;
+  std::optional<Publications> publications; ///< if there are such lidars
   std::vector<HealthTopic> health_topics;
   std::optional<FlatGroundTopic> flat_ground;
   DdsEntity graph;
@@ -175,6 +199,7 @@ std::unique_ptr<RosLink::Session> RosLink::connect() {
 }
 
 void RosLink::receive(Session& session) {
+  session.follow_publications();
   const Stamp arrival{read_clock(CLOCK_REALTIME)};
   const Duration now = read_clock(CLOCK_MONOTONIC);
   for (auto& from : session.imus)
@@ -193,7 +218,7 @@ void RosLink::receive(Session& session) {
     from.reader.take_serialised([&](const SerialisedSample& cloud, dds_instance_handle_t writer) {
       ++from.received;
       if (from.admission.admits(writer, now)) // may have arrived while the samples above were handled
-        cloud_sink_(from.lidar, Stamp{read_clock(CLOCK_REALTIME)}, cloud);
+        cloud_sink_(from.lidar, Stamp{read_clock(CLOCK_REALTIME)}, from.reader.type(), cloud);
     });
   for (auto& from : session.health_topics)
     from.reader.take([&](const ros::Bool& message, dds_instance_handle_t writer) {

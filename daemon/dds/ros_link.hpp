@@ -30,8 +30,9 @@ struct FlatGroundMessage {
 /// Any input over DDS except clouds.
 using RosInput = std::variant<ImuInput, OdometryInput, ExternalHealth, FlatGroundMessage>;
 
-/// Receives a cloud of the lidar with this index.
-using RosCloudSink = std::function<void(std::uint8_t lidar, Stamp arrival, const SerialisedSample& cloud)>;
+/// Receives a cloud of the lidar with this index; its type is that of read_cloud().
+using RosCloudSink =
+    std::function<void(std::uint8_t lidar, Stamp arrival, std::string_view type, const SerialisedSample& cloud)>;
 
 /// Link to the robot's ROS 2 network: subscribes to the configured topics, publishes odometry and related messages.
 ///

@@ -21,6 +21,8 @@ using TFMessage = tf2_msgs_msg_dds__TFMessage_;
 using Imu = sensor_msgs_msg_dds__Imu_;
 using PointField = sensor_msgs_msg_dds__PointField_;
 using PointCloud2 = sensor_msgs_msg_dds__PointCloud2_;
+using LivoxPoint = livox_ros_driver2_msg_dds__CustomPoint_;
+using LivoxCloud = livox_ros_driver2_msg_dds__CustomMsg_;
 using KeyValue = diagnostic_msgs_msg_dds__KeyValue_;
 using DiagnosticStatus = diagnostic_msgs_msg_dds__DiagnosticStatus_;
 using DiagnosticArray = diagnostic_msgs_msg_dds__DiagnosticArray_;
@@ -53,6 +55,10 @@ template <> inline Type type_of<Imu>() {
 }
 template <> inline Type type_of<PointCloud2>() {
   return {&sensor_msgs_msg_dds__PointCloud2__desc, "9198cabf7da3796ae6fe19c4cb3bdd3525492988c70522628af5daa124bae2b5"};
+}
+template <> inline Type type_of<LivoxCloud>() {
+  return {&livox_ros_driver2_msg_dds__CustomMsg__desc,
+          "2eb17e5e35bf5a2d6cd079f3c57f33abf95e5bf7d71b42cddc05daace73d815a"};
 }
 template <> inline Type type_of<DiagnosticArray>() {
   return {&diagnostic_msgs_msg_dds__DiagnosticArray__desc,

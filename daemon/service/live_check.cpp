@@ -2,13 +2,16 @@
 #include "daemon/service/live_check.hpp"
 
 #include <algorithm>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
 
 #include <fmt/format.h>
 
+#include "daemon/dds/cloud_reader.hpp"
 #include "daemon/dds/dds_node.hpp"
+#include "daemon/dds/publications.hpp"
 #include "daemon/machine_time.hpp"
 #include "daemon/service/machine.hpp"
 #include "drivers/lidar_survey.hpp"
@@ -23,11 +26,11 @@ struct Subscription {
   std::string name;
   std::optional<DdsReader<ros::Imu>> imu{};
   std::optional<DdsReader<ros::Odometry>> odometry{};
-  std::optional<DdsReader<ros::PointCloud2>> clouds{};
+  std::optional<CloudReader> clouds{};
   std::uint64_t messages = 0;
   std::uint32_t writers = 0;
 
-  void poll() {
+  void poll(const DdsNode& node) {
     const auto count = [this](const auto&) { ++messages; };
     if (imu) {
       imu->take(count);
@@ -38,6 +41,7 @@ struct Subscription {
       writers = std::max(writers, odometry->writers());
     }
     if (clouds) {
+      clouds->follow(node);
       clouds->take_serialised([this](const auto&, auto) { ++messages; });
       writers = std::max(writers, clouds->writers());
     }
@@ -139,30 +143,16 @@ void compare(const LidarOptions& options, const Config& config, const std::vecto
                                         options.port, lidar.packets_per_s, lidar.clock_state()));
 }
 
-/// Returns the type with which the topic is published, correct or not; empty without a publisher.
-std::string published_type(const DdsNode& node, const std::string& topic) {
-  const DdsEntity reader{dds_create_reader(node.participant(), DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr)};
-  std::string type;
-  constexpr std::uint32_t kMaxEndpoints = 1024;
-  std::vector<void*> samples(kMaxEndpoints);
-  std::vector<dds_sample_info_t> infos(kMaxEndpoints);
-  const dds_return_t count = dds_read(reader.handle(), samples.data(), infos.data(), kMaxEndpoints, kMaxEndpoints);
-  for (std::size_t i = 0; count > 0 && i < static_cast<std::size_t>(count); ++i)
-    if (const auto* writer = static_cast<const dds_builtintopic_endpoint_t*>(samples[i]);
-        infos[i].valid_data && "rt" + topic == writer->topic_name)
-      type = writer->type_name;
-  if (count > 0)
-    dds_return_loan(reader.handle(), samples.data(), count);
-  return type;
-}
+/// DDS types of the topics that are published.
+using Types = std::map<std::string, std::string>;
 
-void compare(const Subscription& topic, const DdsNode& node, const DdsOptions& dds, Duration duration,
+void compare(const Subscription& topic, const Types& published, const DdsOptions& dds, Duration duration,
              LiveCheck& check) {
   const std::string about = fmt::format("{}: topic {}: ", topic.label, topic.name);
-  const std::string type = topic.writers == 0 ? published_type(node, topic.name) : "";
-  if (!type.empty())
-    check.differences.push_back(
-        fmt::format("{}is published as {}; set {}another topic", about, type, topic.clouds ? "" : "its kind, or "));
+  const auto other = topic.writers == 0 ? published.find(topic.name) : published.end();
+  if (other != published.end())
+    check.differences.push_back(fmt::format("{}is published as {}; set {}another topic", about, other->second,
+                                            topic.clouds ? "" : "its kind, or "));
   else if (topic.writers == 0)
     check.differences.push_back(fmt::format(
         "{}no publisher in domain {} on {}; check the name of the topic, and ROS_DOMAIN_ID and interface of its node",
@@ -192,16 +182,28 @@ Expected<LiveCheck, std::string> check_live(const Config& config, Duration durat
   LiveCheck check;
   auto node = DdsNode::open(config.dds);
   std::vector<Subscription> topics;
-  if (node)
+  std::optional<Publications> publications;
+  Types published;
+  if (node) {
     topics = subscribe(*node, config);
-  else
+    publications.emplace(*node);
+  } else {
     check.differences.push_back(node.error());
+  }
+  const auto store = [&](const std::string& name, std::string_view type) {
+    published[name] = type;
+    for (Subscription& topic : topics)
+      if (topic.clouds)
+        topic.clouds->discover(name, type);
+  };
 
   LidarSurvey survey;
   for (Duration listened{}; listened < duration; listened += kRound) {
     wire->listen(kRound, [&](const Datagram& datagram) { survey.add(datagram); });
+    if (publications)
+      publications->take(store);
     for (Subscription& topic : topics)
-      topic.poll();
+      topic.poll(*node);
   }
   const std::vector<SurveyedLidar> lidars = survey.lidars();
   for (const LidarOptions& lidar : config.lidars)
@@ -210,7 +212,7 @@ Expected<LiveCheck, std::string> check_live(const Config& config, Duration durat
   if (const std::string others = unconfigured_lidars(config, lidars); !others.empty() && check.differences.empty())
     check.matches.push_back(fmt::format("not configured: {}", others));
   for (const Subscription& topic : topics)
-    compare(topic, *node, config.dds, duration, check);
+    compare(topic, published, config.dds, duration, check);
   return check;
 }
 

@@ -56,10 +56,10 @@ Session::Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket
     : config_(config), log_(log), started_(MachineTime::now()),
       input_(std::move(sockets), publishes_clouds(config.lidars)),
       flat_ground_(state && state->is_recent ? state->flat_ground : config.odometry.flat_ground), incidents_(incidents),
-      resets_(resets),
-      link_(
-          config, [this](const RosInput& input) { receive(input); }, instance_name(),
-          [this](std::uint8_t lidar, Stamp arrival, const SerialisedSample& cloud) { receive(lidar, arrival, cloud); }),
+      resets_(resets), link_(
+                           config, [this](const RosInput& input) { receive(input); }, instance_name(),
+                           [this](std::uint8_t lidar, Stamp arrival, std::string_view type,
+                                  const SerialisedSample& cloud) { receive(lidar, arrival, type, cloud); }),
       clouds_(config.dds, link_), start_(std::move(state)),
       state_saver_(state_path(), config.motion_sources, [this](const std::string& problem) { log_.error(problem); }) {
   if (start_) {
@@ -264,9 +264,10 @@ void Session::receive(const RosInput& input) {
 }
 
 /// Copies a cloud into the input. Allocates only for a cloud larger than all earlier ones.
-void Session::receive(std::uint8_t lidar, Stamp arrival, const SerialisedSample& cloud) {
+void Session::receive(std::uint8_t lidar, Stamp arrival, std::string_view type, const SerialisedSample& cloud) {
   CloudBytes& next = input_.next_cloud(lidar);
   next.arrival = arrival;
+  next.type = type;
   next.too_large = cloud.size() > CloudBytes::kMaxBytes;
   next.bytes.resize(next.too_large ? 0 : cloud.size());
   if (!next.too_large)

@@ -95,7 +95,7 @@ class Session {
   void hand_to_viewer(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate);
   void after_estimate(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate);
   void receive(const RosInput& input);
-  void receive(std::uint8_t lidar, Stamp arrival, const SerialisedSample& cloud);
+  void receive(std::uint8_t lidar, Stamp arrival, std::string_view type, const SerialisedSample& cloud);
   void apply(FlatGroundMessage message);
   void run_publisher();
   void publish(const ProcessedSweep& done);

@@ -40,8 +40,9 @@ struct CloudView {
 
 /// Message types of clouds, in ROS 1 notation.
 inline constexpr std::string_view kPointCloudType = "sensor_msgs/PointCloud2";
+inline constexpr std::string_view kLivoxCloudType = "livox_ros_driver2/CustomMsg";
 constexpr bool is_livox_type(std::string_view type) {
-  return type == "livox_ros_driver/CustomMsg" || type == "livox_ros_driver2/CustomMsg";
+  return type == kLivoxCloudType || type == "livox_ros_driver/CustomMsg";
 }
 constexpr bool is_cloud_type(std::string_view type) { return type == kPointCloudType || is_livox_type(type); }
 

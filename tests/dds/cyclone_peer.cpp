@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A Cyclone DDS participant: cyclone_peer DOMAIN listen|talk|iron|humble|command|flood|mistype|clouds|mount PREFIX;
-// iron and humble print the discovery of nodes and of DDS endpoints. A listener prints `matched TOPIC` once it knows a
-// writer. See peer_words.hpp.
+// A Cyclone DDS participant: cyclone_peer DOMAIN listen|talk|iron|humble|command|flood|mistype|clouds|livox|mount
+// PREFIX; iron and humble print the discovery of nodes and of DDS endpoints. A listener prints `matched TOPIC` once it
+// knows a writer. See peer_words.hpp.
 #include <algorithm>
 #include <array>
 #include <cstdlib>
@@ -229,6 +229,26 @@ void talk_of_clouds(const DdsNode& node) {
   });
 }
 
+/// Publishes the room ten times a second, as Livox' driver does.
+void talk_as_livox(const DdsNode& node) {
+  const DdsWriter<ros::LivoxCloud> clouds{node, "/points", TopicQos::sensor_out()};
+  std::vector<ros::LivoxPoint> points;
+  for (const room_cloud::LivoxPoint& point : room_cloud::livox_points())
+    points.push_back(
+        {point.offset_ns, point.xyz_m[0], point.xyz_m[1], point.xyz_m[2], point.reflectivity, 0, point.line});
+  const auto count = static_cast<std::uint32_t>(points.size());
+  std::string frame = "lidar";
+  talk_of_turns([&](std::int32_t sec, std::uint32_t nanosec) {
+    ros::LivoxCloud cloud{};
+    cloud.header_ = {{sec, nanosec}, frame.data()};
+    cloud.timebase_ = static_cast<std::uint64_t>(sec) * 1'000'000'000 + nanosec;
+    cloud.point_num_ = count;
+    cloud.points_ = {count, count, points.data(), false};
+    if (!clouds.write(cloud))
+      throw std::runtime_error("DDS did not take a cloud");
+  });
+}
+
 /// Publishes once where the lidar of talk_of_clouds() is mounted.
 void mount(const DdsNode& node) {
   const DdsWriter<ros::TFMessage> transforms{node, "/tf_static", TopicQos::latch()};
@@ -251,8 +271,9 @@ void mistype(const DdsNode& node) {
 
 void run(int argc, char** argv) {
   if (argc < 4 || argc > 6)
-    throw std::runtime_error("usage: cyclone_peer DOMAIN listen|talk|iron|humble|command|flood|mistype|clouds|mount "
-                             "PREFIX [INTERFACE [ENCLAVE]]");
+    throw std::runtime_error(
+        "usage: cyclone_peer DOMAIN "
+        "listen|talk|iron|humble|command|flood|mistype|clouds|livox|mount PREFIX [INTERFACE [ENCLAVE]]");
   DdsOptions options;
   options.domain = std::atoi(argv[1]); // NOLINT
   if (argc >= 5)
@@ -277,6 +298,8 @@ void run(int argc, char** argv) {
     mistype(*node);
   else if (role == "clouds")
     talk_of_clouds(*node);
+  else if (role == "livox")
+    talk_as_livox(*node);
   else if (role == "mount")
     mount(*node);
   else

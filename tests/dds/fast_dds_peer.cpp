@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A participant of Fast DDS, ROS 2's default: fast_dds_peer DOMAIN listen|talk|iron|humble|clouds PREFIX [ADDRESS];
-// iron and humble print the discovery of nodes and of DDS endpoints. Uses the loopback interface, or that of ADDRESS. A
-// listener prints `matched TOPIC` once it knows a writer. See peer_words.hpp.
+// A participant of Fast DDS, ROS 2's default: fast_dds_peer DOMAIN listen|talk|iron|humble|clouds|livox PREFIX
+// [ADDRESS]; iron and humble print the discovery of nodes and of DDS endpoints. Uses the loopback interface, or that of
+// ADDRESS. A listener prints `matched TOPIC` once it knows a writer. See peer_words.hpp.
 #include <atomic>
 #include <cstdlib>
 #include <deque>
@@ -174,15 +174,20 @@ void talk(dds::DomainParticipant& participant) {
   });
 }
 
-/// Publishes a room ten times a second, reliably: an asynchronous thread sends messages larger than a datagram.
-void talk_of_clouds(dds::DomainParticipant& participant) {
+/// Returns a reliable writer of clouds: an asynchronous thread sends messages larger than a datagram.
+template <class Cloud> dds::DataWriter* cloud_writer(dds::DomainParticipant& participant) {
   dds::DataWriterQos qos;
   qos.reliability().kind = dds::RELIABLE_RELIABILITY_QOS;
   qos.publish_mode().kind = dds::ASYNCHRONOUS_PUBLISH_MODE;
   qos.history().depth = 1;
   qos.endpoint().history_memory_policy = kAsNeeded;
-  dds::DataWriter* const clouds = participant.create_publisher(dds::PUBLISHER_QOS_DEFAULT)
-                                      ->create_datawriter(topic_of<FastCloud>(participant, "/points"), qos);
+  return participant.create_publisher(dds::PUBLISHER_QOS_DEFAULT)
+      ->create_datawriter(topic_of<Cloud>(participant, "/points"), qos);
+}
+
+/// Publishes a room ten times a second.
+void talk_of_clouds(dds::DomainParticipant& participant) {
+  dds::DataWriter* const clouds = cloud_writer<FastCloud>(participant);
   FastCloud cloud;
   cloud.header.frame_id = "lidar";
   cloud.height = 1;
@@ -195,6 +200,22 @@ void talk_of_clouds(dds::DomainParticipant& participant) {
   talk_of_turns([&](std::int32_t sec, std::uint32_t nanosec) {
     cloud.header.sec = sec;
     cloud.header.nanosec = nanosec;
+    clouds->write(&cloud);
+  });
+}
+
+/// Publishes the room ten times a second, as Livox' driver does.
+void talk_as_livox(dds::DomainParticipant& participant) {
+  dds::DataWriter* const clouds = cloud_writer<FastLivoxCloud>(participant);
+  FastLivoxCloud cloud;
+  cloud.header.frame_id = "lidar";
+  for (const room_cloud::LivoxPoint& point : room_cloud::livox_points())
+    cloud.points.push_back({point.offset_ns, point.xyz_m, point.reflectivity, 0, point.line});
+  cloud.point_num = static_cast<std::uint32_t>(cloud.points.size());
+  talk_of_turns([&](std::int32_t sec, std::uint32_t nanosec) {
+    cloud.header.sec = sec;
+    cloud.header.nanosec = nanosec;
+    cloud.timebase = static_cast<std::uint64_t>(sec) * 1'000'000'000 + nanosec;
     clouds->write(&cloud);
   });
 }
@@ -215,7 +236,7 @@ void hear_all(dds::DomainParticipant& participant, const std::string& prefix) {
 
 void run(int argc, char** argv) {
   if (argc != 4 && argc != 5)
-    throw std::runtime_error("usage: fast_dds_peer DOMAIN listen|talk|iron|humble|clouds PREFIX [ADDRESS]");
+    throw std::runtime_error("usage: fast_dds_peer DOMAIN listen|talk|iron|humble|clouds|livox PREFIX [ADDRESS]");
   static Discovery discovery;
   const auto domain = static_cast<std::uint32_t>(std::atoi(argv[1])); // NOLINT
   const std::string role = argv[2];
@@ -226,6 +247,8 @@ void run(int argc, char** argv) {
     return talk(participant);
   if (role == "clouds")
     return talk_of_clouds(participant);
+  if (role == "livox")
+    return talk_as_livox(participant);
   if (role == "iron")
     listen<FastParticipantEntities<16>>(participant, "ros_discovery_info", "node", true, true);
   else if (role == "humble")

@@ -102,6 +102,24 @@ struct FastCloud {
   }
 };
 
+struct FastLivoxPoint {
+  std::uint32_t offset_time = 0;
+  std::array<float, 3> xyz{};
+  std::uint8_t reflectivity = 0, tag = 0, line = 0;
+  template <class Stream> void fields(Stream& s) { s(offset_time)(xyz)(reflectivity)(tag)(line); }
+};
+
+struct FastLivoxCloud {
+  static constexpr const char* kName = "livox_ros_driver2::msg::dds_::CustomMsg_";
+  FastHeader header;
+  std::uint64_t timebase = 0;
+  std::uint32_t point_num = 0;
+  std::uint8_t lidar_id = 0;
+  std::array<std::uint8_t, 3> rsvd{};
+  std::vector<FastLivoxPoint> points;
+  template <class Stream> void fields(Stream& s) { s(header)(timebase)(point_num)(lidar_id)(rsvd)(points); }
+};
+
 struct FastKeyValue {
   std::string key, value;
   template <class Stream> void fields(Stream& s) { s(key)(value); }

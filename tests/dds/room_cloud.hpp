@@ -49,4 +49,29 @@ inline std::vector<std::uint8_t> points() {
   return bytes;
 }
 
+/// A point as Livox' driver publishes it.
+struct LivoxPoint {
+  std::uint32_t offset_ns = 0;
+  std::array<float, 3> xyz_m{};
+  std::uint8_t reflectivity = 0, line = 0;
+};
+inline constexpr std::uint32_t kLivoxColumnStep = 8, kLivoxPoints = kPoints / kLivoxColumnStep;
+
+/// Every eighth column of the room, about as many points as a Livox sends in a tenth of a second.
+inline std::vector<LivoxPoint> livox_points() {
+  const std::vector<std::uint8_t> bytes = points();
+  std::vector<LivoxPoint> livox(kLivoxPoints);
+  for (std::uint32_t i = 0; i < kLivoxPoints; ++i) {
+    const std::uint32_t ring = i % kRings, column = i / kRings * kLivoxColumnStep;
+    const std::uint8_t* const from = bytes.data() + std::size_t{column * kRings + ring} * kStep;
+    float time_s = 0.0F;
+    std::memcpy(&time_s, from + 18, sizeof(time_s));
+    std::memcpy(livox[i].xyz_m.data(), from, sizeof(livox[i].xyz_m));
+    livox[i].offset_ns = static_cast<std::uint32_t>(1e9 * static_cast<double>(time_s));
+    livox[i].reflectivity = 50;
+    livox[i].line = static_cast<std::uint8_t>(ring);
+  }
+  return livox;
+}
+
 } // namespace locus::test::room_cloud

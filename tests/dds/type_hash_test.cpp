@@ -55,6 +55,11 @@ const std::map<std::string, std::string> kDefinitions{
     {"sensor_msgs/msg/PointCloud2",
      "std_msgs/msg/Header header, uint32 height, uint32 width, sensor_msgs/msg/PointField[] fields, bool is_bigendian, "
      "uint32 point_step, uint32 row_step, uint8[] data, bool is_dense"},
+    {"livox_ros_driver2/msg/CustomPoint",
+     "uint32 offset_time, float32 x, float32 y, float32 z, uint8 reflectivity, uint8 tag, uint8 line"},
+    {"livox_ros_driver2/msg/CustomMsg",
+     "std_msgs/msg/Header header, uint64 timebase, uint32 point_num, uint8 lidar_id, uint8[3] rsvd, "
+     "livox_ros_driver2/msg/CustomPoint[] points"},
     {"diagnostic_msgs/msg/KeyValue", "string key, string value"},
     {"diagnostic_msgs/msg/DiagnosticStatus",
      "byte level, string name, string message, string hardware_id, diagnostic_msgs/msg/KeyValue[] values"},
@@ -69,8 +74,9 @@ const std::map<std::string, std::string> kDefinitions{
      "rmw_dds_common/msg/Gid gid, rmw_dds_common/msg/NodeEntitiesInfo[] node_entities_info_seq"}};
 
 /// Numbers of type_description_interfaces/msg/FieldType; arrays are offset by 48, sequences by 144.
-const std::map<std::string, int> kTypeIds{{"uint8", 3},    {"char", 3},  {"int32", 6}, {"uint32", 7},
-                                          {"float64", 11}, {"bool", 15}, {"byte", 16}, {"string", 17}};
+const std::map<std::string, int> kTypeIds{{"uint8", 3},  {"char", 3},     {"int32", 6},    {"uint32", 7},
+                                          {"uint64", 9}, {"float32", 10}, {"float64", 11}, {"bool", 15},
+                                          {"byte", 16},  {"string", 17}};
 constexpr int kNestedType = 1, kBoundedString = 21, kArray = 48, kSequence = 144;
 
 struct Field {
@@ -199,6 +205,15 @@ TEST_P(DiscoveredTypes, OfTheClockHaveTheHashOfRos) {
   ASSERT_TRUE(node) << node.error();
   const DdsWriter<ros::Clock> clock{*node, "/clock", TopicQos::clock()};
   expect_hashes(1, {"rosgraph_msgs/msg/Clock"});
+}
+
+TEST_P(DiscoveredTypes, OfLivoxHasTheHashOfRos) {
+  DdsOptions options;
+  options.domain = domain_.number();
+  const auto node = DdsNode::open(options);
+  ASSERT_TRUE(node) << node.error();
+  const DdsReader<ros::LivoxCloud> clouds{*node, "/livox/lidar", TopicQos::cloud_in()};
+  expect_hashes(1, {"livox_ros_driver2/msg/CustomMsg"});
 }
 
 INSTANTIATE_TEST_SUITE_P(Dds, DiscoveredTypes, testing::Values(CYCLONE_PEER, FAST_DDS_PEER), [](const auto& peer) {

@@ -61,24 +61,6 @@ struct FastFrameWithoutHeader {
   template <class Stream> void fields(Stream& s) { s(packets); }
 };
 
-/// livox_ros_driver2/CustomMsg
-struct FastLivoxPoint {
-  std::uint32_t offset_time = 0;
-  float x = 0, y = 0, z = 0;
-  std::uint8_t reflectivity = 0, tag = 0, line = 0;
-  template <class Stream> void fields(Stream& s) { s(offset_time)(x)(y)(z)(reflectivity)(tag)(line); }
-};
-
-struct FastLivoxCloud {
-  FastHeader header;
-  std::uint64_t timebase = 0;
-  std::uint32_t point_num = 0;
-  std::uint8_t lidar_id = 0;
-  std::array<std::uint8_t, 3> reserved{};
-  std::vector<FastLivoxPoint> points;
-  template <class Stream> void fields(Stream& s) { s(header)(timebase)(point_num)(lidar_id)(reserved)(points); }
-};
-
 template <class Packet> struct FastScan {
   FastHeader header;
   std::vector<Packet> packets;
@@ -271,9 +253,11 @@ std::vector<std::byte> cloud_message(const OwnCloud& cloud, RosVersion ros) {
     FastLivoxCloud livox{
         header_at(cloud.stamp, cloud.frame), static_cast<std::uint64_t>(to_ns(cloud.stamp)), cloud.width, 0, {}, {}};
     for (std::size_t i = 0; i < cloud.width; ++i)
-      livox.points.push_back({cloud.get<std::uint32_t>(i, "offset_time"), cloud.get<float>(i, "x"),
-                              cloud.get<float>(i, "y"), cloud.get<float>(i, "z"),
-                              cloud.get<std::uint8_t>(i, "reflectivity"), 16, cloud.get<std::uint8_t>(i, "line")});
+      livox.points.push_back({cloud.get<std::uint32_t>(i, "offset_time"),
+                              {cloud.get<float>(i, "x"), cloud.get<float>(i, "y"), cloud.get<float>(i, "z")},
+                              cloud.get<std::uint8_t>(i, "reflectivity"),
+                              16,
+                              cloud.get<std::uint8_t>(i, "line")});
     return serialised(livox, ros, most_bytes);
   }
   FastCloud fast{header_at(cloud.stamp, cloud.frame), cloud.height, cloud.width, {}, false, cloud.point_step,

@@ -49,6 +49,27 @@ TEST_P(LiveCloudsOf, AreUsedOnArrival) {
   EXPECT_EQ(clouds["times"], "field");
 }
 
+/// Drivers of both types on one topic, each killed before the next begins.
+TEST_P(LiveCloudsOf, AreUsedWhateverTheirType) {
+  const Child daemon(locusd(written(kConfig)));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
+  std::uint64_t used = 0, points = 0;
+  for (const auto& [role, size] : {std::pair{"livox", room_cloud::kLivoxPoints}, {"clouds", room_cloud::kPoints}}) {
+    const Child peer({GetParam(), "0", role, "/locus"});
+    json clouds;
+    ASSERT_TRUE(status_comes([&](const json& status) {
+      clouds = status["lidars"]["top"]["clouds"];
+      return clouds["used"] > used + 10 && clouds["points"].get<std::uint64_t>() > points + 10 * size;
+    })) << role
+        << clouds.dump(1);
+    EXPECT_EQ(clouds["times"], "field");
+    for (const auto& [reason, count] : clouds["refused"].items())
+      EXPECT_EQ(count, 0) << role << ' ' << reason;
+    used = clouds["used"];
+    points = clouds["points"];
+  }
+}
+
 /// Depends on the speed of the machine.
 TEST_P(LiveCloudsOf, MatchThePublishedNumber) {
   const Child daemon(locusd(written(kConfig)));

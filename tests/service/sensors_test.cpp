@@ -82,6 +82,12 @@ TEST_P(SensorsWithCloudsOf, ProposedConfigurationHasTheirTopicAndMounting) {
   EXPECT_EQ(check.status, 0) << check.out << check.err << found;
 }
 
+TEST_P(SensorsWithCloudsOf, LivoxIsProposed) {
+  const Child driver({GetParam(), "0", "livox", "/locus"});
+  const std::string line = "    topic: /points  # clouds of " + std::to_string(room_cloud::kLivoxPoints) + " points\n";
+  proposal_when([&](const std::string& text) { return contains(text, line); });
+}
+
 TEST_P(SensorsWithCloudsOf, PacketsArePreferredToThem) {
   const Child driver({GetParam(), "0", "clouds", "/locus"}), play(endlessly(capture()));
   const std::string found = proposal_when(

@@ -15,7 +15,7 @@ namespace ros = daemon::ros;
 
 namespace {
 
-template <class Message> bool is_of(const std::string& type) {
+template <class Message> bool is_of(std::string_view type) {
   return type == ros::type_of<Message>().descriptor->m_typename;
 }
 
@@ -31,12 +31,14 @@ Expected<LiveTopics, std::string> LiveTopics::join(const DdsOptions& options) {
 }
 
 LiveTopics::LiveTopics(daemon::DdsNode node, const DdsOptions& options)
-    : node_(std::move(node)), results_(options.prefix + '/'),
-      publications_(dds_create_reader(node_.participant(), DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr)),
+    : node_(std::move(node)), results_(options.prefix + '/'), publications_(node_),
       static_tf_(node_, std::string{kStaticTopic}, {true, 100, true}) {}
 
 void LiveTopics::poll(Stamp now) {
-  subscribe();
+  publications_.take([this](const std::string& topic, std::string_view type) {
+    if (!topic.starts_with(results_))
+      subscribe_to(topic, type);
+  });
   receive_transforms();
   for (auto& [topic, source] : motion_) {
     MotionCandidate& candidate = source.candidate;
@@ -52,31 +54,23 @@ void LiveTopics::poll(Stamp now) {
       });
   }
   for (auto& [topic, clouds] : clouds_)
-    clouds.reader.take([&candidate = clouds.candidate](const ros::PointCloud2& message) {
-      candidate.frame = text_or_empty(message.header_.frame_id_);
-      candidate.points += std::size_t{message.height_} * message.width_;
-      ++candidate.messages;
-    });
+    receive_clouds(clouds);
 }
 
-void LiveTopics::subscribe() {
-  constexpr std::uint32_t kMostEndpoints = 256;
-  std::array<void*, kMostEndpoints> samples{};
-  std::array<dds_sample_info_t, kMostEndpoints> infos{};
-  const dds_return_t count =
-      dds_take(publications_.handle(), samples.data(), infos.data(), kMostEndpoints, kMostEndpoints);
-  for (std::size_t i = 0; count > 0 && i < static_cast<std::size_t>(count); ++i) {
-    const auto* const writer = static_cast<const dds_builtintopic_endpoint_t*>(samples[i]);
-    const std::string name = infos[i].valid_data ? writer->topic_name : "";
-    constexpr std::string_view kOfRos = "rt/";
-    if (name.starts_with(kOfRos) && !name.starts_with("rt" + results_))
-      subscribe_to(name.substr(kOfRos.size() - 1), writer->type_name);
-  }
-  if (count > 0)
-    dds_return_loan(publications_.handle(), samples.data(), count);
+void LiveTopics::receive_clouds(Clouds& clouds) {
+  clouds.reader.follow(node_);
+  clouds.reader.take_serialised([&](const daemon::SerialisedSample& sample, dds_instance_handle_t /*writer*/) {
+    message_.resize(sample.size());
+    sample.copy_to(message_);
+    if (const auto cloud = read_cloud({message_, Serialisation::cdr}, clouds.reader.type())) {
+      clouds.candidate.frame = cloud->frame;
+      clouds.candidate.points += std::size_t{cloud->height} * cloud->width;
+      ++clouds.candidate.messages;
+    }
+  });
 }
 
-void LiveTopics::subscribe_to(const std::string& topic, const std::string& type) {
+void LiveTopics::subscribe_to(const std::string& topic, std::string_view type) {
   using daemon::TopicQos;
   if (motion_.size() + clouds_.size() >= kMostTopics || motion_.contains(topic) || clouds_.contains(topic))
     return;
@@ -87,9 +81,9 @@ void LiveTopics::subscribe_to(const std::string& topic, const std::string& type)
     motion_[topic] = {{.topic = topic, .kind = SourceKind::odometry, .frame = ""},
                       {},
                       daemon::DdsReader<ros::Odometry>(node_, topic, TopicQos::sensor_in())};
-  else if (is_of<ros::PointCloud2>(type))
-    clouds_.emplace(topic, Clouds{{.topic = topic, .frame = ""},
-                                  daemon::DdsReader<ros::PointCloud2>(node_, topic, TopicQos::cloud_in())});
+  else if (daemon::CloudReader::carries_clouds(type))
+    clouds_.emplace(topic, Clouds{{.topic = topic, .frame = ""}, {node_, topic, TopicQos::cloud_in()}})
+        .first->second.reader.discover(topic, type);
 }
 
 void LiveTopics::receive_transforms() {

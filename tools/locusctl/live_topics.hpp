@@ -9,7 +9,9 @@
 
 #include "config/config.hpp"
 #include "core/base/expected.hpp"
+#include "daemon/dds/cloud_reader.hpp"
 #include "daemon/dds/dds_node.hpp"
+#include "daemon/dds/publications.hpp"
 #include "daemon/dds/ros_messages.hpp"
 #include "discovery/motion_candidates.hpp"
 #include "discovery/static_transforms.hpp"
@@ -46,20 +48,21 @@ class LiveTopics {
   };
   struct Clouds {
     CloudCandidate candidate;
-    daemon::DdsReader<daemon::ros::PointCloud2> reader;
+    daemon::CloudReader reader;
   };
 
   LiveTopics(daemon::DdsNode node, const DdsOptions& options);
-  void subscribe();
-  void subscribe_to(const std::string& topic, const std::string& type);
+  void subscribe_to(const std::string& topic, std::string_view type);
+  void receive_clouds(Clouds& clouds);
   void receive_transforms();
 
   daemon::DdsNode node_;
   std::string results_; ///< prefix of the topics of locusd
-  daemon::DdsEntity publications_;
+  daemon::Publications publications_;
   daemon::DdsReader<daemon::ros::TFMessage> static_tf_;
   std::map<std::string, Motion> motion_; ///< by topic
   std::map<std::string, Clouds> clouds_; ///< by topic
+  std::vector<std::byte> message_;       ///< serialised cloud
   StaticTransforms transforms_;
 };
 
