@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -32,13 +33,18 @@ Vector3d waddle(double time_s) {
   return {0.03 * std::cos(phase), 0.03 * std::sin(phase), 0.8 * std::sin(0.6 * time_s)};
 }
 
+/// Slopes, along which no sweep turns by more than noise.
+Vector3d roll_over_slopes(double time_s) {
+  return {0.07 * std::sin(0.6 * time_s), 0.09 * std::sin(0.45 * time_s), 0.13 * std::sin(0.3 * time_s)};
+}
+
 Vector3d turn_on_level_ground(double time_s) { return {0.0, 0.0, 0.8 * std::sin(0.6 * time_s)}; }
 
 /// A gyro whose axes are `R_gyro_base`, with stamps that are `late_s` late, beside lidar; both with noise.
 class Comparison {
  public:
-  Comparison(Turned turned, const Matrix3d& R_gyro_base, double late_s = 0.0)
-      : turned_(turned), R_gyro_base_(R_gyro_base), late_s_(late_s) {}
+  Comparison(Turned turned, const Matrix3d& R_gyro_base, double late_s = 0.0, double noise_deg = 0.2)
+      : turned_(turned), R_gyro_base_(R_gyro_base), late_s_(late_s), noise_(0.0, noise_deg * kRadPerDeg) {}
 
   void drive(double duration_s) {
     for (double time_s = 0.0; time_s < duration_s; time_s += kSweep_s) {
@@ -60,7 +66,7 @@ class Comparison {
   Matrix3d R_gyro_base_;
   double late_s_;
   std::mt19937 random_{7};
-  std::normal_distribution<double> noise_{0.0, 0.2 * kRadPerDeg};
+  std::normal_distribution<double> noise_;
 };
 
 Matrix3d turned_by(const Vector3d& rpy_deg) { return from_rpy_rad(kRadPerDeg * rpy_deg).toRotationMatrix(); }
@@ -122,6 +128,46 @@ TEST(AxesCheck, LateStampsAreNoExchangeOfAxes) {
   Comparison exchanged(waddle, turned_by({0, 0, 90}));
   exchanged.drive(15.0);
   EXPECT_FALSE(exchanged.check.is_wrong()) << "a delay may be the cause";
+}
+
+TEST(AxesCheck, SlowTurnsAreSummed) {
+  Comparison turned(roll_over_slopes, turned_by({0, 0, 180}), 0.0, 0.05);
+  turned.drive(60.0);
+  EXPECT_TRUE(turned.check.is_wrong());
+  Comparison sound(roll_over_slopes, Matrix3d::Identity(), 0.0, 0.05);
+  sound.drive(600.0);
+  EXPECT_FALSE(sound.check.is_wrong());
+}
+
+/// However large its turn, and however long the time since the last.
+TEST(AxesCheck, OneSweepDoesNotDecide) {
+  AxesCheck check;
+  AxesCheck::GyroTurns gyro_rad;
+  gyro_rad.fill({-1.0, -1.0, 1.0});
+  check.add({1.0, 1.0, 1.0}, gyro_rad, 60.0);
+  EXPECT_FALSE(check.is_wrong());
+}
+
+TEST(AxesCheck, DecisionIsFinal) {
+  Comparison sound(walk, Matrix3d::Identity()), turned(walk, turned_by({0, 0, 180}));
+  sound.drive(60.0);
+  turned.drive(60.0);
+  ASSERT_TRUE(turned.check.is_wrong());
+  std::swap(sound.check, turned.check);
+  sound.drive(600.0);
+  turned.drive(600.0);
+  EXPECT_TRUE(sound.check.is_wrong()) << "a gyro that was wrong measures soundly";
+  EXPECT_FALSE(turned.check.is_wrong()) << "a gyro that was confirmed is turned";
+}
+
+/// Wrong for certain before it is known how.
+TEST(AxesCheck, WrongRemainsWrongWithoutAxes) {
+  Comparison upside_down(turn_on_level_ground, turned_by({180, 0, 0})), sound(walk, Matrix3d::Identity());
+  upside_down.drive(60.0);
+  ASSERT_TRUE(upside_down.check.is_wrong());
+  std::swap(upside_down.check, sound.check);
+  sound.drive(600.0);
+  EXPECT_TRUE(sound.check.is_wrong());
 }
 
 /// A lidar that has lost its way reports turns that have nothing to do with the gyro's.
