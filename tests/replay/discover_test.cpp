@@ -238,6 +238,25 @@ TEST_F(Discover, BaseIsTheBodyOfTheOdometryIfThereIsNoOther) {
   expect_same_bits(bag);
 }
 
+TEST_F(Discover, LidarWhoseMessagesNameNoFrameIsTheBase) {
+  constexpr std::size_t kLength = 12, kName = 16; // in a header of ROS 1
+  Messages messages = room_messages();
+  for (RecordedMessage& message : messages) {
+    if (message.type != "velodyne_msgs/VelodyneScan")
+      continue;
+    const auto name = message.data.begin() + kName;
+    message.data.erase(name, name + static_cast<std::ptrdiff_t>(std::string_view("velodyne").size()));
+    std::fill_n(message.data.begin() + kLength, kName - kLength, std::byte{0});
+  }
+  const std::string bag = bag_of(messages);
+  expect_lines(discover(bag), {"# messages of the lidar name no frame: poses are those of the lidar\n",
+                               "# /tf_static does not connect 'imu_link' with the lidar: measure it"});
+  const Replay replay({"--duration", "1", bag});
+  expect_lines(replay.run().out, {"no mounting of the lidar on base_link, so poses are those of the lidar; set it",
+                                  "no mounting of imu (imu_link) on the lidar, so its axes are assumed to be those of "
+                                  "the lidar; set it with --set motion_sources.imu."});
+}
+
 TEST_F(Discover, NamesInARecordingCannotAddKeys) {
   Messages messages = room_messages();
   for (RecordedMessage& message : messages)

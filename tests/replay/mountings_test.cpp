@@ -90,7 +90,7 @@ TEST_F(Mountings, ImuRotationIsReadFromTheStaticTransforms) {
 
 TEST_F(Mountings, ImuWithoutAMountingIsReportedUntilItsRotationIsSet) {
   const std::string unknown = "/tf_static has no mounting of imu (imu_link) on velodyne, so its axes are assumed to be "
-                              "those of velodyne; set it with --set motion_sources.1.T_base_source.rpy_deg=[ROLL,",
+                              "those of velodyne; set it with --set motion_sources.imu.T_base_source.rpy_deg=[ROLL,",
                     bag = bag_with({});
   const Replay replay({"--duration", "1", bag}), set({"--duration", "1", "--set", kSetTurned, bag});
   EXPECT_TRUE(contains(replay.run().out, unknown)) << replay.run().out;

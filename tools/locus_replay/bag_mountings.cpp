@@ -37,6 +37,11 @@ std::string text_of(const Pose& pose) {
                      rounded(rpy_deg.z(), 0.1));
 }
 
+/// Key of a mounting: by index for the reasons, by name for the user, whose file may list the sensors in another order.
+struct Key {
+  std::string by_index, by_name;
+};
+
 /// Mounts the sensors of one bag.
 class Mounting {
  public:
@@ -53,7 +58,7 @@ class Mounting {
     for (std::size_t i = is_base ? 1 : 0; i < unset.size(); ++i) {
       const std::string frame = frame_of(topics.of_lidar[i]);
       mount("the lidar", frame, T_base(frame), unset[i], config_.lidars[i].T_base_lidar,
-            fmt::format("lidars.{}.T_base_lidar", i));
+            {fmt::format("lidars.{}.T_base_lidar", i), fmt::format("lidars.{}.T_base_lidar", config_.lidars[i].name)});
     }
   }
 
@@ -67,7 +72,8 @@ class Mounting {
       if (const auto T_lidar_imu = survey_.transforms.between(first_lidar_, frame); !T_base_imu && T_lidar_imu)
         T_base_imu = config_.lidars.front().T_base_lidar * *T_lidar_imu;
       mount(source.name, frame, T_base_imu, unset[i], source.T_base_source,
-            fmt::format("motion_sources.{}.T_base_source", i));
+            {fmt::format("motion_sources.{}.T_base_source", i),
+             fmt::format("motion_sources.{}.T_base_source", source.name)});
     }
   }
 
@@ -85,13 +91,15 @@ class Mounting {
     lines_.push_back(fmt::format("{}: /tf_static has no mounting of the lidar{} on {}, so poses are those of the "
                                  "lidar; set it with --set lidars.0.T_base_lidar.xyz_m=[X,Y,Z], and rpy_deg",
                                  bag_name_, first_lidar_.empty() ? "" : fmt::format(" ({})", first_lidar_), base_));
-    reasons_.of_key["lidars.0.T_base_lidar"] =
-        fmt::format("/tf_static does not connect '{}' with {}: poses are those of the lidar", first_lidar_, base_);
+    reasons_.of_key["lidars.0.T_base_lidar"] = fmt::format(
+        "{}: poses are those of the lidar",
+        first_lidar_.empty() ? "messages of the lidar name no frame"
+                             : fmt::format("/tf_static does not connect '{}' with {}", first_lidar_, base_));
     base_ = first_lidar_;
   }
 
   void mount(const std::string& sensor, const std::string& frame, const std::optional<Pose>& T_base_sensor,
-             const Parts& unset, Pose& mounting, const std::string& key) {
+             const Parts& unset, Pose& mounting, const Key& key) {
     if (!T_base_sensor && unset.rotation && !frame.empty())
       report_unknown(sensor, frame, key);
     if (!T_base_sensor || !unset.any())
@@ -101,17 +109,18 @@ class Mounting {
       mounting.rotation = T_written.rotation;
     if (unset.translation)
       mounting.translation = T_written.translation;
-    reasons_.of_key[key] = fmt::format("{} on {}, by /tf_static", frame, base_);
+    reasons_.of_key[key.by_index] = fmt::format("{} on {}, by /tf_static", frame, base_);
     lines_.push_back(fmt::format("{}: {} ({}) is mounted at {} on {}, by /tf_static{}", bag_name_, sensor, frame,
                                  text_of(mounting), base_, unset.all() ? "" : " and --set"));
   }
 
-  void report_unknown(const std::string& sensor, const std::string& frame, const std::string& key) {
+  void report_unknown(const std::string& sensor, const std::string& frame, const Key& key) {
+    const std::string base = base_.empty() ? "the lidar" : base_;
     lines_.push_back(fmt::format("{}: /tf_static has no mounting of {} ({}) on {}, so its axes are assumed to be those "
                                  "of {}; set it with --set {}.rpy_deg=[ROLL,PITCH,YAW]",
-                                 bag_name_, sensor, frame, base_, base_, key));
-    reasons_.of_key[key] =
-        fmt::format("/tf_static does not connect '{}' with {}: measure it, above all its rotation", frame, base_);
+                                 bag_name_, sensor, frame, base, base, key.by_name));
+    reasons_.of_key[key.by_index] =
+        fmt::format("/tf_static does not connect '{}' with {}: measure it, above all its rotation", frame, base);
   }
 
   const BagSurvey& survey_;
