@@ -16,7 +16,7 @@ from browser import Browser  # exits if there is no browser
 from selenium.webdriver import ActionChains
 
 FIGURES = {"plan", "map", "side", "boxes", "timeline"}
-TABLES = {"stages", "packets", "sources", "configuration"}
+TABLES = {"stages", "input", "sources", "configuration"}
 
 # Contrast ratio of two colours by WCAG 2.
 CONTRAST = """
@@ -179,8 +179,18 @@ class Report(unittest.TestCase):
         with self.browser("nothing") as browser:
             self.assertEqual(browser.drawn(), TABLES)
             self.assertIn("There was no sweep", browser.one("#plan .note").text)
-            self.assertIn("rejected: length", browser.one("#packets").text)
-            self.assertIn("VLP-16", browser.one("#packets").text)
+            self.assertIn("rejected: length", browser.one("#input").text)
+            self.assertIn("VLP-16", browser.one("#input").text)
+            self.assertEqual(browser.complaints(), [])
+
+    def test_clouds_have_a_table_in_place_of_packets(self):
+        with self.browser("clouds") as browser:
+            table = browser.one("#input").text
+            for part in "/points", "clouds used 150", "refused: fields ▲ 2":
+                self.assertIn(part, table)
+            for part in "acket", "model":
+                self.assertNotIn(part, table)
+            self.assertNotIn("packets", browser.one("#key-figures").text)
             self.assertEqual(browser.complaints(), [])
 
 

@@ -30,6 +30,23 @@ int main(int argc, char** argv) {
 
   locus::tools::write_report(folder / "bare.html", SampleRun::bare().report());
 
+  SampleRun clouds = SampleRun::bare();
+  clouds.summary["packets"].erase("front");
+  clouds.summary["packets"].erase("rear");
+  clouds.summary["packets"]["total"]["received"] = 0;
+  clouds.summary["lidars"] = {{"front",
+                               {{"topic", "/points"},
+                                {"clouds",
+                                 {{"received", 152},
+                                  {"used", 150},
+                                  {"reordered", 0},
+                                  {"clock_steps", 0},
+                                  {"refused", {{"cut", 0}, {"fields", 2}}},
+                                  {"points", 4'292'375},
+                                  {"times", "field"},
+                                  {"rings", "field"}}}}}};
+  locus::tools::write_report(folder / "clouds.html", clouds.report());
+
   SampleRun nothing = SampleRun::bare();
   nothing.sweeps.clear();
   locus::tools::write_report(folder / "nothing.html", nothing.report());

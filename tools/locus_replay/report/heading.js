@@ -38,7 +38,8 @@ function machine() {
 
 function keyFigures() {
   const {sweeps, packets, process_ms, duration_s, wall_s} = summary;
-  const lost_of = `of ${count(sweeps.seen)} sweeps; ${count(packets.total.lost)} packets lost`;
+  const lost = packets.total.received > 0 ? `; ${count(packets.total.lost)} packets lost` : "";
+  const lost_of = `of ${count(sweeps.seen)} sweeps${lost}`;
   return [
     ...wayFigures(),
     {name: "Recording", ...duration(duration_s), detail: `${written(duration_s / wall_s)} × real time`},

@@ -9,12 +9,12 @@ import {heading} from "./heading.js";
 import {mapView} from "./map_view.js";
 import {plan, side} from "./projection.js";
 import {run} from "./run.js";
-import {configuration, packets, sources, stages} from "./tables.js";
+import {configuration, input, sources, stages} from "./tables.js";
 import {timeline} from "./timeline.js";
 
 const kTables = {
   stages,
-  packets,
+  input,
   sources,
   configuration
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tables of the report: cost of each stage, packets, sweeps, sources, configuration.
+// Tables of the report: cost of each stage, input of the lidars, sweeps, sources, configuration.
 import {max} from "d3-array";
 import {scaleLinear} from "d3-scale";
 import {select} from "d3-selection";
@@ -60,10 +60,17 @@ function drawQuantiles(svg, {p50, p90, p99}, scale) {
   svg.append("circle").attr("r", 3.5).attr("cx", percent(p50)).attr("cy", "50%");
 }
 
-export function packets(section) {
+/** Draws what the lidars sent: packets, clouds or both. */
+export function input(section) {
   const drawing = section.select(".drawing").html("");
   const {total, ...lidars} = summary.packets;
-  const columns = Object.entries(lidars);
+  const ofPackets = Object.entries(lidars);
+  const ofClouds = Object.entries(summary.lidars).filter(([, {clouds}]) => clouds);
+  if (ofPackets.length > 0) packets(drawing, ofPackets, total);
+  if (ofClouds.length > 0) clouds(drawing, ofClouds);
+}
+
+function packets(drawing, columns, total) {
   if (columns.length > 1) columns.push(["all", total]);
   const row = (name, write) => [name, ...columns.map(([, counters]) => write(counters))];
   const rejections = Object.keys(total.rejected).filter((reason) => total.rejected[reason] > 0);
@@ -74,6 +81,22 @@ export function packets(section) {
     ...rejections.map((reason) => row(`rejected: ${words(reason)}`, (counters) => mishap(counters.rejected[reason]))),
   ]);
   if (rejections.length === 0) drawing.append("p").attr("class", "note").text("No packet was rejected.");
+}
+
+function clouds(drawing, columns) {
+  const row = (name, write) => [name, ...columns.map(([, lidar]) => write(lidar.clouds))];
+  const refused = (why) => columns.some(([, lidar]) => lidar.clouds.refused[why] > 0);
+  const refusals = Object.keys(columns[0][1].clouds.refused).filter(refused);
+  table(drawing, ["", ...columns.map(([name]) => name)], [
+    ["topic", ...columns.map(([, {topic}]) => topic)],
+    row("clouds received", (one) => count(one.received)),
+    row("clouds used", (one) => count(one.used)),
+    ...refusals.map((why) => row(`refused: ${words(why)}`, (one) => mishap(one.refused[why]))),
+    ...["reordered", "clock_steps"].map((key) => row(words(key), (one) => mishap(one[key]))),
+    row("points", (one) => count(one.points)),
+    row("times of points", (one) => one.times),
+    row("rings", (one) => one.rings),
+  ]);
 }
 
 export function sources(section) {
