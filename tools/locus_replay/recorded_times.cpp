@@ -86,13 +86,14 @@ void RecordedTimes::LidarClock::accept(Datagram datagram) {
   const LidarPacket* const packet = lidars_.receive(datagram);
   if (packet == nullptr || packet->lidar != lidar_.value_or(packet->lidar))
     return;
+  const Stamp sent = packet->stamp + packet->duration;
   const bool is_first = !std::exchange(lidar_, packet->lidar).has_value();
-  const Duration step = is_first ? Duration{} : packet->stamp - latest_;
+  const Duration step = is_first ? Duration{} : sent - latest_;
   const bool is_overtaken = step < Duration{} && step >= -kLongestStep;
   if (is_first)
-    first_ = packet->stamp;
+    first_ = sent;
   if (!is_overtaken)
-    latest_ = packet->stamp;
+    latest_ = sent;
   elapsed_ += step <= kLongestStep ? std::max(step, Duration{}) : Duration{};
 }
 

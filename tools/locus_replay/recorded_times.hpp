@@ -44,15 +44,15 @@ class RecordedTimes : public DatagramSource {
 
     /// Reads the time of a datagram; ignores its arrival time.
     void accept(Datagram datagram);
-    /// Returns the time since the first packet.
+    /// Returns the time since the first packet was sent.
     [[nodiscard]] Duration elapsed() const { return elapsed_; }
-    /// Returns the UTC time of the first packet if position packets contain it.
+    /// Returns the UTC time at which the first packet was sent if position packets contain it.
     [[nodiscard]] std::optional<Stamp> utc() const;
 
    private:
     LidarRouter lidars_;
     std::optional<std::uint8_t> lidar_;
-    Stamp first_, latest_;
+    Stamp first_, latest_; ///< sent then
     Duration elapsed_{};
   };
 
