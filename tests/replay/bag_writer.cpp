@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <stdexcept>
+#include <utility>
 
 #include <gtest/gtest.h>
 #include <sqlite3.h>
@@ -372,9 +373,12 @@ std::vector<RecordedMessage> messages_of(const std::filesystem::path& capture_fo
   auto imu = MotionSamples<ImuSample>::open(capture_folder / "imu.csv");
   for (const ImuSample& sample : imu->drain())
     messages.push_back({"/imu/data", "sensor_msgs/Imu", sample.arrival, imu_message(sample, ros)});
-  auto wio = MotionSamples<OdometrySample>::open(capture_folder / "wio.tum");
-  for (const OdometrySample& sample : wio->drain())
-    messages.push_back({"/wheel_odometry", "nav_msgs/Odometry", sample.arrival, odometry_message(sample, ros)});
+  for (const auto& [file, topic] :
+       {std::pair{"wio.tum", "/wheel_odometry"}, {"vio.tum", "/visual_odometry"}, {"kio.tum", "/kinematic_odometry"}}) {
+    if (auto odometry = MotionSamples<OdometrySample>::open(capture_folder / file))
+      for (const OdometrySample& sample : odometry->drain())
+        messages.push_back({topic, "nav_msgs/Odometry", sample.arrival, odometry_message(sample, ros)});
+  }
   std::ranges::stable_sort(messages, {}, &RecordedMessage::recorded);
   return messages;
 }

@@ -58,7 +58,8 @@ void write_db3(const std::filesystem::path& file, std::span<const RecordedMessag
                const std::string& serialisation = "cdr");
 
 /// Converts a capture folder to the messages of a bag: one message per turn with the data packets of each port, on
-/// `/PORT/velodyne_packets`; imu.csv on /imu/data and wio.tum on /wheel_odometry.
+/// `/PORT/velodyne_packets`; imu.csv on /imu/data, wio.tum, vio.tum and kio.tum on the topics of locus-sim's
+/// configuration.
 std::vector<RecordedMessage> messages_of(const std::filesystem::path& capture_folder, RosVersion ros,
                                          decltype(scan_message)& packet_message = scan_message);
 

@@ -30,11 +30,13 @@ inline void write_room_drive(const std::filesystem::path& folder, Duration durat
   sim::write_capture_folder(folder, sim::room(), trajectory, duration, robot);
 }
 
-/// Drives written at build time (CMakeLists.txt), read-only: 8 s and 20 s around the room, 20 s of a husky of locus-sim
-/// through the plant, and 4 s around the room in KITTI's format.
+/// Drives written at build time (CMakeLists.txt), read-only: 8 s and 20 s around the room, 20 s each of locus-sim's
+/// husky through plant and mine and of its walking robot through the plant, and 4 s around the room in KITTI's format.
 std::filesystem::path room_drive();
 std::filesystem::path long_room_drive();
 std::filesystem::path plant_drive();
+std::filesystem::path mine_drive();
+std::filesystem::path walking_drive();
 std::filesystem::path kitti_room_drive();
 
 } // namespace locus::test
