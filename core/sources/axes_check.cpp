@@ -84,6 +84,13 @@ void AxesCheck::compare() {
   for (std::size_t i = 0; i < kLates; ++i)
     costs_[kAssignments + i] += weight * cost((lidar - gyro(i)).squaredNorm());
   costs_[kUnrelated] += weight * cost(0.5 * (lidar.squaredNorm() + in_time.squaredNorm()));
+
+  const Eigen::Vector3d degrees_rad = kRadPerDeg * gyro_rad_[kLates / 2];
+  const double noise_in_degrees = noise_rad(degrees_rad, lidar_rad_);
+  for (std::size_t i = 0; i < kShares.size(); ++i) {
+    const Eigen::Vector3d difference = plain(lidar_rad_ - kShares[i] * degrees_rad, noise_in_degrees);
+    costs_[kDegrees + i] += weight * cost(difference.squaredNorm() / (noise_in_degrees * noise_in_degrees));
+  }
 }
 
 void AxesCheck::decide() {
@@ -96,6 +103,8 @@ void AxesCheck::decide() {
     else
       second = std::min(second, costs_[i]);
   wrong_ = wrong_ || std::min(as_mounted, costs_[kUnrelated]) - costs_[best] > kCertain;
+  const double otherwise = std::min(as_mounted, std::ranges::min(std::span(costs_).subspan(kDegrees + 1)));
+  in_degrees_ = in_degrees_ || otherwise - costs_[kDegrees] > kCertain;
   if (wrong_ && second - costs_[best] > kExcluded)
     axes_ = assignment(best);
   decided_ = axes_ || (!wrong_ && costs_[best] - as_mounted > kExcluded);

@@ -19,7 +19,11 @@ namespace locus {
 ///
 /// Stamps that are late exchange axes, too: in a gait, roll and pitch lag each other. So the assignment must explain
 /// the turns better than any delay of the gyro does, and better than turns that are unrelated, as those of a lidar that
-/// has lost its way. Turns about one axis say nothing about the others. One owner.
+/// has lost its way. Turns about one axis say nothing about the others.
+///
+/// A gyro in deg/s is found in the same way: a fifty-seventh of its turns must explain those of lidar better than the
+/// turns as they are, than half or twice as much, and than none. So the robot has to turn: vibrations of one at rest
+/// are enormous then, but those of a noisy gyro are, too. One owner.
 class AxesCheck {
  public:
   /// Delays of the gyro's stamps that are considered: from -kMostLate to kMostLate.
@@ -48,10 +52,14 @@ class AxesCheck {
   /// Returns the matrix that maps turns in the axes of the mounting to those of the base, once a single one explains
   /// them. Its determinant is -1 if no mounting does.
   [[nodiscard]] const std::optional<Eigen::Matrix3d>& axes() const { return axes_; }
+  /// Tells whether the gyro certainly reports deg/s. Once true, it remains so.
+  [[nodiscard]] bool is_in_degrees() const { return in_degrees_; }
 
  private:
   static constexpr std::size_t kAssignments = 48; ///< the first is the identity
-  static constexpr std::size_t kUnrelated = kAssignments + kLates;
+  static constexpr std::size_t kUnrelated = kAssignments + kLates, kDegrees = kUnrelated + 1;
+  /// Parts of the turns of a gyro in deg/s that may explain those of lidar: all of them if it is one.
+  static constexpr std::array kShares{1.0, 0.0, 0.5, 2.0};
 
   void compare();
   void decide();
@@ -59,8 +67,9 @@ class AxesCheck {
   Eigen::Vector3d lidar_rad_ = Eigen::Vector3d::Zero(); ///< sums of turns that have not been compared
   GyroTurns gyro_rad_;
   double elapsed_s_ = 0.0;
-  std::array<double, kUnrelated + 1> costs_; ///< -2 log likelihood of assignments, delays, and unrelated turns
-  bool wrong_ = false, decided_ = false;
+  /// -2 log likelihood of assignments, delays, unrelated turns, and kShares of turns in degrees.
+  std::array<double, kDegrees + kShares.size()> costs_;
+  bool wrong_ = false, decided_ = false, in_degrees_ = false;
   std::optional<Eigen::Matrix3d> axes_;
 };
 

@@ -23,6 +23,11 @@ constexpr int kRounds = 3; ///< quarantines until it is rejected although the ca
 constexpr double kLikeness = 0.7;
 constexpr double kScaleTolerance = 0.5; ///< sweeps without motion correction are distorted
 constexpr double kDegPerRad = 1.0 / kRadPerDeg;
+constexpr double kMuchMore = 7.6; ///< square root of kDegPerRad: from here on deg/s are likelier than rad/s
+
+constexpr std::string_view kInDegrees =
+    "and lidar disagree on how much the robot turns: the gyro reports some 57 times as much, as if in deg/s, not in "
+    "rad/s; it is not used any more, until a restart (possible cause: the unit of its driver)";
 
 constexpr Duration kMaxGap = std::chrono::milliseconds{100};   ///< across which the gyro is integrated
 constexpr Duration kResolution = std::chrono::milliseconds{5}; ///< of the stored turns
@@ -138,13 +143,14 @@ bool ImuSelfCheck::is_yet_to_be_used(const RegistrationFeedback& feedback) const
 std::optional<HealthReason> ImuSelfCheck::on_feedback(LidarOpinion /*opinion*/, const RegistrationFeedback& feedback) {
   if (is_yet_to_be_used(feedback))
     return std::nullopt;
-  const bool was_refused = refused_, was_set_aside = set_aside_;
+  const bool was_set_aside = set_aside_;
+  const std::string_view before = verdict_;
   compare_axes(feedback);
   if (!refused_ && covers(feedback.from) && covers(feedback.to)) {
     compare(feedback);
     review();
   }
-  const bool is_lost = (refused_ && !was_refused) || (set_aside_ && !was_set_aside);
+  const bool is_lost = (refused_ && verdict_ != before) || (set_aside_ && !was_set_aside);
   return is_lost ? std::optional{HealthReason::self_check} : std::nullopt;
 }
 
@@ -166,7 +172,9 @@ void ImuSelfCheck::compare_axes(const RegistrationFeedback& feedback) {
     compare_axes(seen);
     oldest_seen_ = (oldest_seen_ + 1) % seen_.size();
   }
-  if (axes_check_.is_wrong() && !refused_)
+  if (axes_check_.is_in_degrees())
+    refuse(kInDegrees); // also if it was refused for what its first turns looked like
+  else if (axes_check_.is_wrong() && !refused_)
     refuse("and lidar disagree on the axes about which the robot turns: those of the gyro are exchanged or reversed; "
            "it is not used any more, until a restart (possible causes: T_base_source, the driver of the gyro, or "
            "T_base_lidar)");
@@ -206,7 +214,7 @@ double ImuSelfCheck::Turns::likeness() const { return gyro_lidar / std::sqrt(gyr
 ImuSelfCheck::Difference ImuSelfCheck::Turns::difference() const {
   if (gyro_gyro < sweeps * AxesCheck::kNoise_rad * AxesCheck::kNoise_rad)
     return Difference::gyro_still;
-  if (likeness() < -kLikeness)
+  if (likeness() < -kLikeness && gyro_gyro < -kMuchMore * gyro_lidar)
     return Difference::opposite;
   return has_scale(kDegPerRad) ? Difference::degrees : Difference::any;
 }
@@ -305,7 +313,7 @@ void ImuSelfCheck::reset() {
 }
 
 void ImuSelfCheck::refuse(std::string_view verdict) {
-  if (!axes_check_.is_wrong())
+  if (!axes_check_.is_wrong() && !axes_check_.is_in_degrees())
     axes_check_ = {};
   refused_ = true;
   verdict_ = verdict;

@@ -40,6 +40,12 @@ Vector3d roll_over_slopes(double time_s) {
 
 Vector3d turn_on_level_ground(double time_s) { return {0.0, 0.0, 0.8 * std::sin(0.6 * time_s)}; }
 
+/// A robot at rest whose engine shakes it by 0.1 degrees.
+Vector3d vibrate(double time_s) {
+  const double phase = 2.0 * std::numbers::pi * 13.0 * time_s;
+  return {0.001 * std::cos(phase), 0.001 * std::sin(1.3 * phase), 0.0};
+}
+
 /// A gyro whose axes are `R_gyro_base`, with stamps that are `late_s` late, beside lidar; both with noise.
 class Comparison {
  public:
@@ -76,6 +82,7 @@ TEST(AxesCheck, SoundGyroIsNotWrong) {
   sound.drive(600.0);
   EXPECT_FALSE(sound.check.is_wrong());
   EXPECT_FALSE(sound.check.axes());
+  EXPECT_FALSE(sound.check.is_in_degrees());
 }
 
 TEST(AxesCheck, QuarterAndHalfTurnsAreFound) {
@@ -123,6 +130,7 @@ TEST(AxesCheck, LateStampsAreNoExchangeOfAxes) {
       Comparison late(robot, Matrix3d::Identity(), late_s);
       late.drive(120.0);
       EXPECT_FALSE(late.check.is_wrong()) << late_s;
+      EXPECT_FALSE(late.check.is_in_degrees()) << late_s;
     }
   }
   Comparison exchanged(waddle, turned_by({0, 0, 90}));
@@ -170,6 +178,32 @@ TEST(AxesCheck, WrongRemainsWrongWithoutAxes) {
   EXPECT_TRUE(sound.check.is_wrong());
 }
 
+Matrix3d scaled_by(double scale) { return scale * Matrix3d::Identity(); }
+
+TEST(AxesCheck, GyroInDegreesIsFoundInTurns) {
+  for (const Turned robot : {walk, turn_on_level_ground}) {
+    Comparison in_degrees(robot, scaled_by(1.0 / kRadPerDeg));
+    in_degrees.drive(20.0);
+    EXPECT_TRUE(in_degrees.check.is_in_degrees());
+    EXPECT_FALSE(in_degrees.check.is_wrong());
+  }
+}
+
+/// The gyro may just as well be noisy.
+TEST(AxesCheck, GyroInDegreesIsNotFoundInVibrations) {
+  Comparison at_rest(vibrate, scaled_by(1.0 / kRadPerDeg));
+  at_rest.drive(600.0);
+  EXPECT_FALSE(at_rest.check.is_in_degrees());
+}
+
+TEST(AxesCheck, GyroOfAnotherScaleIsNotInDegrees) {
+  for (const double scale : {0.0, 0.5, 2.0, 9.55, 20.0, 150.0, 1000.0, -1.0 / kRadPerDeg}) {
+    Comparison scaled(walk, scaled_by(scale));
+    scaled.drive(600.0);
+    EXPECT_FALSE(scaled.check.is_in_degrees()) << scale;
+  }
+}
+
 /// A lidar that has lost its way reports turns that have nothing to do with the gyro's.
 TEST(AxesCheck, UnrelatedTurnsAreNoEvidence) {
   std::mt19937 random(11);
@@ -183,6 +217,7 @@ TEST(AxesCheck, UnrelatedTurnsAreNoEvidence) {
       check.add(any_turn(), gyro_rad, kSweep_s);
     }
     ASSERT_FALSE(check.is_wrong()) << drive;
+    ASSERT_FALSE(check.is_in_degrees()) << drive;
   }
 }
 

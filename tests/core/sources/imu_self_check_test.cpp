@@ -125,6 +125,17 @@ TEST_F(ImuSelfCheckTest, GyroInDegreesIsRejectedByName) {
   EXPECT_NE(check.verdict().find("deg/s"), std::string_view::npos);
 }
 
+/// Before the first turn lidar sees nothing but noise, which says nothing about the way in which the gyro turns.
+TEST_F(ImuSelfCheckTest, GyroInDegreesIsNamedThoughItsVibrationsWereRejectedBefore) {
+  ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
+  for (int round = 0; round < 3; ++round)
+    turn(check, 12, {6, 0, 0}, {-0.1, 0, 0});
+  EXPECT_TRUE(refused_);
+  EXPECT_NE(check.verdict().find("different turns"), std::string_view::npos) << check.verdict();
+  turn(check, 60, {0, 0, 0.5 / kRadPerDeg}, {0, 0, 0.5});
+  EXPECT_NE(check.verdict().find("deg/s"), std::string_view::npos) << check.verdict();
+}
+
 TEST_F(ImuSelfCheckTest, InvertedGyroIsRejected) {
   ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   drive(check, seconds{5}, [](ImuSample& sample) { sample.angular_velocity_radps *= -1.0; });
