@@ -52,17 +52,22 @@ std::nullopt_t HealthMonitor::leave_out(HealthReason reason) {
   return std::nullopt;
 }
 
-/// Leaves a sample out, and follows how long this has been going on.
+/// Leaves a sample out.
 std::nullopt_t HealthMonitor::refuse(HealthReason reason, Stamp arrival) {
   leave_out(reason);
+  extend_refusal(reason, arrival);
+  if (state_ == State::never_received && refusal_->is_worth_reporting())
+    lose(reason, arrival);
+  return std::nullopt;
+}
+
+/// Follows how long the source has not been used although it sends samples.
+void HealthMonitor::extend_refusal(HealthReason reason, Stamp arrival) {
   if (!refusal_)
     refused_since_ = arrival;
   refusal_ = {reason, std::max(arrival - refused_since_, Duration{})};
   if (refusal_->lasted > longest_refusal_.lasted)
     longest_refusal_ = *refusal_;
-  if (state_ == State::never_received && refusal_->is_worth_reporting())
-    lose(reason, arrival);
-  return std::nullopt;
 }
 
 void HealthMonitor::accept(const SourceReading& reading) {
@@ -84,6 +89,8 @@ void HealthMonitor::accept(const SourceReading& reading) {
   }
   if (state_ == State::healthy)
     refusal_.reset();
+  else
+    extend_refusal(lost_for_, reading.arrival);
 }
 
 void HealthMonitor::advance(Stamp now) {

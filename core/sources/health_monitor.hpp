@@ -59,9 +59,10 @@ class HealthMonitor {
   [[nodiscard]] bool trusts_accelerometer() const;
   /// Returns HealthMetric::gyro_axes().
   [[nodiscard]] std::optional<Eigen::Matrix3d> gyro_axes() const;
-  /// Returns the present run of refused samples; empty while the source is healthy and before its first sample.
+  /// Returns the present run of samples that are refused, or not used because the source is on probation; empty while
+  /// it is healthy and before its first sample.
   [[nodiscard]] const std::optional<Refusal>& refusal() const { return refusal_; }
-  /// Returns the longest run of refused samples so far, the present one included.
+  /// Returns the longest such run so far, the present one included.
   [[nodiscard]] const Refusal& longest_refusal() const { return longest_refusal_; }
   /// Returns the arrival of the last good sample; Stamp{} before the first.
   [[nodiscard]] Stamp last_received() const { return last_arrival_; }
@@ -75,6 +76,7 @@ class HealthMonitor {
   std::optional<Stamp> judge(SourceReading reading);
   std::nullopt_t leave_out(HealthReason reason);
   std::nullopt_t refuse(HealthReason reason, Stamp arrival);
+  void extend_refusal(HealthReason reason, Stamp arrival);
   void accept(const SourceReading& reading);
   void lose(HealthReason reason, Stamp now);
   void change(bool healthy, HealthReason reason, Stamp now);

@@ -6,8 +6,8 @@ namespace locus {
 std::string_view explanation(HealthReason reason) {
   switch (reason) {
   case HealthReason::stale:
-    return "is silent, or its samples arrive more than 0.1 s after they were measured (check its driver, the network "
-           "and the clock of its stamps)";
+    return "is silent, or its samples arrive in bursts, or more than 0.1 s after they were measured (check its driver, "
+           "the network and the clock of its stamps)";
   case HealthReason::jump:
     return "claims a motion that no robot can make (check its units, its stamps and whether it was reset)";
   case HealthReason::nan:

@@ -41,12 +41,12 @@ inline constexpr std::string_view kTooFast =
 /// source.
 std::string_view explanation(HealthReason reason);
 
-/// Run of refused samples of a source, between which it was never healthy.
+/// Run of samples of a source that are refused or, on probation, not used; between them it was never healthy.
 struct Refusal {
   static constexpr Duration kWorthReporting = std::chrono::seconds{5};
 
-  HealthReason reason = HealthReason::stale; ///< of the latest refused sample
-  Duration lasted{};                         ///< from the first to the latest refused sample
+  HealthReason reason = HealthReason::stale; ///< of the latest refused sample, or of the loss before the probation
+  Duration lasted{};                         ///< from the first to the latest such sample
 
   /// Returns false for a self-check, which has a verdict of its own.
   [[nodiscard]] bool is_worth_reporting() const {

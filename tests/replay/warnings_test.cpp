@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Warnings about likely mistakes that used to pass silently.
+#include <algorithm>
 #include <fstream>
 #include <functional>
 
@@ -55,6 +56,21 @@ TEST(Warnings, SourceWhoseSamplesAreAllRejected) {
   const std::string verdict = replay.summary()["sources"]["wio"]["verdict"];
   EXPECT_NE(verdict.find("orientations that are no rotation"), std::string::npos) << verdict;
   EXPECT_EQ(replay.summary()["sources"]["wio"]["used_sweeps"], 0);
+}
+
+/// An IMU whose driver passes its samples on in bursts was left out in silence.
+TEST(Warnings, SourceWhoseSamplesArriveInBursts) {
+  const TemporaryFolder folder;
+  std::filesystem::copy_file(room_drive() / "imu.csv", folder / "imu.csv");
+  std::ofstream arrivals(folder / "imu.meta.csv");
+  arrivals << "t_ns,arrival_ns,covariance_scale\n";
+  const std::vector<ImuSample> samples = MotionSamples<ImuSample>::open(room_drive() / "imu.csv")->drain();
+  for (std::size_t i = 0; i < samples.size(); ++i)
+    arrivals << to_ns(samples[i].stamp) << ',' << to_ns(samples[std::min(i / 12 * 12 + 11, samples.size() - 1)].stamp)
+             << ",1\n";
+  arrivals.close();
+  expect_warning({"--imu", folder / "imu.csv", room_drive().string()},
+                 {"motion source imu was rejected for", "its samples arrive in bursts"});
 }
 
 /// A lidar whose laser is off sends its position packets alone; the advice was to record what had been recorded.

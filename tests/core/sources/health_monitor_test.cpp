@@ -102,6 +102,25 @@ TEST_F(WheelsTest, RefusalLastsUntilTheyAreHealthy) {
   EXPECT_FALSE(monitor_.refusal());
 }
 
+/// Samples at 200 Hz that arrive twelve at a time are silent for longer than their rate permits, again and again: the
+/// source is never used, and nothing said why.
+TEST(HealthMonitor, ReportsASourceWhoseSamplesArriveInBursts) {
+  HealthMonitor monitor(kWheels);
+  const Stamp start = stamp_from_ns(1'700'000'000'000'000'000);
+  int losses = 0;
+  for (int i = 0; i < 200 * 10; ++i) {
+    const Stamp stamp = start + i * milliseconds{5}, arrival = start + (i / 12 * 12 + 11) * milliseconds{5};
+    monitor.judge(OdometrySample{
+        .stamp = stamp, .arrival = arrival, .T_source_base = {Eigen::Quaterniond::Identity(), {0.005 * i, 0, 0}}});
+    losses += monitor.pop_event().has_value() ? 1 : 0;
+  }
+  EXPECT_FALSE(monitor.healthy());
+  EXPECT_EQ(losses, 1) << "said once";
+  ASSERT_TRUE(monitor.refusal());
+  EXPECT_TRUE(monitor.refusal()->is_worth_reporting());
+  EXPECT_EQ(monitor.refusal()->reason, HealthReason::stale);
+}
+
 TEST_F(WheelsTest, TheirPeriodIsKnownAfterFiftySamples) {
   ASSERT_TRUE(monitor_.period());
   EXPECT_NEAR(to_seconds(*monitor_.period()), 0.02, 1e-3);
