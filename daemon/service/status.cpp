@@ -82,7 +82,7 @@ void SessionMonitor::check_lidars(const Figures& figures) {
     Lidar& lidar = lidars_[i];
     const bool has_new_data = used > lidar.data;
     if (used != lidar.data || lidar.last_data == Duration::zero()) { // fewer: the counters were reset
-      if (has_new_data && !lidar.logged_silence.empty())
+      if (has_new_data && lidar.logged_silence.any())
         log_.info(fmt::format("lidar {}: data received", lidars[i].name), {{"LOCUS_LIDAR", lidars[i].name}});
       lidar = {.data = used,
                .received = ingest.lidars[i].received(),
@@ -105,10 +105,10 @@ void SessionMonitor::check_lidars(const Figures& figures) {
     check_doubts(lidar, lidars[i], ingest.lidars[i]);
     if (now - lidar.last_data < kPatience)
       continue;
-    const std::string why = why_silent(lidar, lidars[i], ingest.lidars[i]);
-    if (why == lidar.logged_silence)
+    const auto [kind, why] = why_silent(lidar, lidars[i], ingest.lidars[i]);
+    if (lidar.logged_silence.test(static_cast<std::size_t>(kind)))
       continue;
-    lidar.logged_silence = why;
+    lidar.logged_silence.set(static_cast<std::size_t>(kind));
     const std::string what = lidars[i].gives_clouds() ? fmt::format("cloud on topic {}", lidars[i].topic)
                                                       : fmt::format("data packet on UDP port {}", lidars[i].port);
     log_.warn(fmt::format("lidar {}: no {} for {} s; {}", lidars[i].name, what,
@@ -129,32 +129,38 @@ void SessionMonitor::check_doubts(Lidar& lidar, const LidarOptions& options, con
     log_.warn(line, {{"LOCUS_LIDAR", options.name}});
 }
 
-std::string SessionMonitor::why_silent(const Lidar& lidar, const LidarOptions& options,
-                                       const IngestReport::Lidar& now) {
+std::pair<SessionMonitor::Silence, std::string>
+SessionMonitor::why_silent(const Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now) {
   const PacketCounters& packets = now.packets;
   if (now.clouds)
     return now.received() == lidar.received
-               ? "check that its driver runs and publishes it in this domain, and that DDS may use that interface"
-               : "its clouds are rejected; locusctl status counts the reasons";
+               ? std::pair{Silence::nothing_arrives, "check that its driver runs and publishes it in this domain, and "
+                                                     "that DDS may use that interface"}
+               : std::pair{Silence::rejected, "its clouds are rejected; locusctl status counts the reasons"};
   if (packets.received == lidar.received)
-    return "check its power and cable, and the address it sends to (locusctl sensors)";
+    return {Silence::nothing_arrives, "check its power and cable, and the address it sends to (locusctl sensors)"};
   if (packets[PacketError::sender] > 0 && now.refused_ip && now.source_ip)
-    return fmt::format("packets come from {}, {} {}: set lidars.{}.source_ip to that of the lidar",
-                       dotted(*now.refused_ip), options.source_ip ? "configured is" : "the lidar was",
-                       dotted(*now.source_ip), options.name);
+    return {Silence::other_sender,
+            fmt::format("packets come from {}, {} {}: set lidars.{}.source_ip to that of the lidar",
+                        dotted(*now.refused_ip), options.source_ip ? "configured is" : "the lidar was",
+                        dotted(*now.source_ip), options.name)};
   if (packets.data + packets.position == packets.received)
-    return fmt::format("only its position packets arrive; its laser or motor is off (see its web page), or its data "
-                       "packets go to another port (locusctl sensors): set lidars.{}.port",
-                       options.name);
+    return {Silence::positions_only,
+            fmt::format("only its position packets arrive; its laser or motor is off (see its web page), or its data "
+                        "packets go to another port (locusctl sensors): set lidars.{}.port",
+                        options.name)};
   const std::string unknown = now.unknown_packets ? fmt::format(" ({})", to_string(*now.unknown_packets)) : "";
   if (options.is_ouster())
-    return stale_metadata(options, now)
-        .value_or(fmt::format("its packets are rejected; locusctl status counts the reasons. Check that {} is the "
-                              "metadata of this sensor in its present mode; locusctl fetch SENSOR fetches it",
-                              options.metadata));
-  return fmt::format("its packets are rejected{}; locusctl status counts the reasons. Check that the lidar is of a "
-                     "supported model, and lidars.{}.model",
-                     unknown, options.name);
+    return {
+        Silence::rejected,
+        stale_metadata(options, now)
+            .value_or(fmt::format("its packets are rejected; locusctl status counts the reasons. Check that {} is "
+                                  "the metadata of this sensor in its present mode; locusctl fetch SENSOR fetches it",
+                                  options.metadata))};
+  return {Silence::rejected,
+          fmt::format("its packets are rejected{}; locusctl status counts the reasons. Check that the lidar is of a "
+                      "supported model, and lidars.{}.model",
+                      unknown, options.name)};
 }
 
 /// Logs faults of sources that remain in partial use; those of a lost source are logged with its loss.

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <bitset>
+#include <cstddef>
 #include <cstdint>
 #include <ctime>
 #include <optional>
@@ -10,6 +11,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "config/config.hpp"
 #include "daemon/figures.hpp"
@@ -55,18 +57,23 @@ class SessionMonitor {
   void check_publishers(const LinkFigures& link);
   void check_recording(const Recorder::Status& recording);
 
+  /// Kind of reason for the silence of a lidar.
+  enum class Silence : std::uint8_t { nothing_arrives, other_sender, positions_only, rejected, count };
+
   /// Last known state of a lidar.
   struct Lidar {
     std::uint64_t data = 0, received = 0; ///< counters at the last usable data
     Duration last_data{};                 ///< time of the last usable data, or start of the wait for it
-    std::string logged_silence;           ///< logged reason of its silence; empty: not silent
+    /// Reasons logged in the present silence, each once: other senders take turns.
+    std::bitset<static_cast<std::size_t>(Silence::count)> logged_silence;
     bool short_sweep_logged = false;
     bool shared_port_logged = false;
     CloudDoubts logged_doubts{};
     std::string logged_unused_pps; ///< logged reason why its locked PPS is not used
   };
   void check_doubts(Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now);
-  static std::string why_silent(const Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now);
+  static std::pair<Silence, std::string> why_silent(const Lidar& lidar, const LidarOptions& options,
+                                                    const IngestReport::Lidar& now);
 
   const Config& config_;
   std::span<const UdpSocket> sockets_;

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <chrono>
 #include <fstream>
+#include <iterator>
 #include <regex>
 #include <thread>
 
@@ -329,6 +330,23 @@ TEST_F(SessionMonitorTest, ReportsASilentLidarAfterFiveSecondsOncePerReason) {
   EXPECT_EQ(said_after(Duration{1}), Lines{"locusd: lidar front: data received"});
   EXPECT_EQ(said_after(kPatience - Duration{1}), Lines{});
   EXPECT_EQ(said_after(Duration{1}).size(), 1U) << "again silent";
+}
+
+/// Two other lidars send to its port, in turn.
+TEST_F(SessionMonitorTest, LogsLittleInTenMinutesWithoutALidar) {
+  figures_.live->link.connected = true;
+  for (daemon::LinkFigures::Source& source : figures_.live->link.sources)
+    source.received = 1;
+  lidar().source_ip = INADDR_LOOPBACK + 7;
+  Lines said;
+  for (unsigned check = 0; check < 2400; ++check) {
+    ++lidar().packets.received;
+    ++lidar().packets[PacketError::sender];
+    lidar().refused_ip = INADDR_LOOPBACK + check % 2;
+    std::ranges::copy(said_after(milliseconds{250}), std::back_inserter(said));
+  }
+  EXPECT_LT(said.size(), 10U) << testing::PrintToString(said);
+  EXPECT_TRUE(std::ranges::any_of(said, [](const std::string& line) { return contains(line, "packets come from"); }));
 }
 
 TEST_F(SessionMonitorTest, ReportsASilentSourceFiveSecondsAfterTheStart) {
