@@ -35,6 +35,7 @@ void say(const ros::DiagnosticArray& m, const char* topic) {
   for (std::uint32_t i = 0; i < m.status_._length; ++i) {
     const ros::DiagnosticStatus& status = m.status_._buffer[i];
     tell("{} {} {} {}", topic, status.level_, status.values_._length, status.name_);
+    tell("{}_message {}: {}", topic, status.name_, status.message_);
   }
 }
 

@@ -251,6 +251,29 @@ TEST_F(Diagnosis, DisagreementOfWheelsAndLidarIsReportedWithItsPossibleCauses) {
   EXPECT_EQ(status()["incidents"]["kept"], 1);
 }
 
+/// A source of which every sample was refused was refused in silence.
+TEST_F(Diagnosis, SourceWithoutAnAcceptedSampleIsReportedWithTheReasonWhereverOneLooks) {
+  const std::string why = "it sends values that are not numbers, or too large for any sensor (check its driver)";
+  const auto has_reason = [&](const std::string& text) { return contains(text, why); };
+  const Child daemon(led_locusd(config()));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
+  const Child listener({CYCLONE_PEER, "0", "listen", "/locus"});
+  ASSERT_TRUE(hears_the_service(listener));
+  const Child play(leading_play({"--fail", "wio:nan@0", capture().string()}));
+  EXPECT_TRUE(daemon.wait_for_line("motion source wio is lost (nan): " + why + "; the next best one is used"))
+      << testing::PrintToString(daemon.lines());
+  EXPECT_TRUE(status_comes([&](const nlohmann::json& status) {
+    const auto& wio = status["sources"]["wio"];
+    return has_reason(wio["verdict"].get<std::string>()) && wio["rejected"]["nan"] == wio["received"];
+  }));
+  EXPECT_TRUE(has_reason(ctl({"status"}).out));
+  EXPECT_TRUE(listener.wait_until([&](const std::vector<std::string>& lines) {
+    return std::ranges::any_of(lines, [&](const std::string& line) {
+      return line.starts_with("diagnostics_message locusd: source wio: ") && has_reason(line);
+    });
+  })) << testing::PrintToString(listener.lines_of("diagnostics_message"));
+}
+
 TEST_F(Diagnosis, DroppedSweepsAreReportedWithTheReason) {
   Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
