@@ -12,8 +12,10 @@
 #include <memory>
 #include <set>
 #include <sstream>
+#include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -183,6 +185,16 @@ class DiscoveredTypes : public testing::TestWithParam<const char*> {
     EXPECT_EQ(found, types);
   }
 
+  /// Returns a participant of locusd in the peer's domain.
+  [[nodiscard]] DdsNode node() const {
+    DdsOptions options;
+    options.domain = domain_.number();
+    Expected<DdsNode, std::string> opened = DdsNode::open(options);
+    if (!opened)
+      throw std::runtime_error(opened.error());
+    return std::move(*opened);
+  }
+
   test::DdsDomain domain_;
   test::Child peer_{{GetParam(), std::to_string(domain_.number()), "iron", "/locus"}};
 };
@@ -199,20 +211,14 @@ TEST_P(DiscoveredTypes, OfTheServiceHaveTheHashesOfRos) {
 }
 
 TEST_P(DiscoveredTypes, OfTheClockHaveTheHashOfRos) {
-  DdsOptions options;
-  options.domain = domain_.number();
-  const auto node = DdsNode::open(options);
-  ASSERT_TRUE(node) << node.error();
-  const DdsWriter<ros::Clock> clock{*node, "/clock", TopicQos::clock()};
+  const DdsNode participant = node();
+  const DdsWriter<ros::Clock> clock{participant, "/clock", TopicQos::clock()};
   expect_hashes(1, {"rosgraph_msgs/msg/Clock"});
 }
 
 TEST_P(DiscoveredTypes, OfLivoxHasTheHashOfRos) {
-  DdsOptions options;
-  options.domain = domain_.number();
-  const auto node = DdsNode::open(options);
-  ASSERT_TRUE(node) << node.error();
-  const DdsReader<ros::LivoxCloud> clouds{*node, "/livox/lidar", TopicQos::cloud_in()};
+  const DdsNode participant = node();
+  const DdsReader<ros::LivoxCloud> clouds{participant, "/livox/lidar", TopicQos::cloud_in()};
   expect_hashes(1, {"livox_ros_driver2/msg/CustomMsg"});
 }
 
