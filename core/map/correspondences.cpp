@@ -8,10 +8,6 @@ namespace locus {
 
 namespace {
 
-/// Variance of a target surface along itself: large against every residual, so it constrains nothing in that direction
-/// (Segal's 1 to epsilon).
-constexpr float kAlongVariance_m2 = 100.0F;
-
 /// Variance of a source point along its surface: that of the arc which it represents. If it were that of the target, a
 /// normal wrong by one degree would cost the point its weight, and the few luckiest normals would decide.
 constexpr float kAlongSourceVariance_m2 = 0.1F * 0.1F;
@@ -55,7 +51,7 @@ void store_match(const Surface& surface, const Eigen::Vector3f& mean_m, std::siz
   matches.normal_y[i] = planar ? surface.normal.y() : 0.0F;
   matches.normal_z[i] = planar ? surface.normal.z() : 0.0F;
   matches.across_m2[i] = planar ? surface.variance_m2 : surface.strewn_m2;
-  matches.along_m2[i] = planar ? kAlongVariance_m2 : surface.strewn_m2;
+  matches.tilt_rad2[i] = planar ? surface.tilt_rad2 : 0.0F;
   matches.found[i] = 1.0F;
   matches.unknown[i] = 0.0F;
 }
@@ -63,7 +59,8 @@ void store_match(const Surface& surface, const Eigen::Vector3f& mean_m, std::siz
 void put_none(std::size_t i, MatchBlock& matches) {
   matches.x_m[i] = matches.y_m[i] = matches.z_m[i] = 0.0F;
   matches.normal_x[i] = matches.normal_y[i] = matches.normal_z[i] = 0.0F;
-  matches.across_m2[i] = matches.along_m2[i] = 1.0F;
+  matches.across_m2[i] = 1.0F;
+  matches.tilt_rad2[i] = 0.0F;
   matches.found[i] = matches.unknown[i] = 0.0F;
 }
 

@@ -36,7 +36,8 @@ struct Cells {
 struct MatchBlock {
   PerPoint x_m, y_m, z_m;                ///< mean, relative to GicpPass::origin_m
   PerPoint normal_x, normal_y, normal_z; ///< zero for a shapeless one
-  PerPoint across_m2, along_m2;          ///< variances; equal for a shapeless one
+  PerPoint across_m2;                    ///< variance along the normal, or of a shapeless one along each axis
+  PerPoint tilt_rad2;                    ///< variance of the normal; zero for a shapeless one
   PerPoint found;                        ///< 1, or 0 where there is no correspondence
   PerPoint unknown;                      ///< 1 in a voxel that is occupied, by a surface of unknown shape
   Cells fine;                            ///< voxels in which they were looked up

@@ -35,8 +35,8 @@ using Sums = std::array<Lanes, kTerms>;
 /// residual of a plane is r = n' (R p + t - mean), its gradient with respect to the pose g = (n, R p x n). Normals are
 /// noisy, and a sum of g g' mistakes their noise for surfaces of every orientation: along a corridor it would tie the
 /// robot to where the scan lines fell. The errors of the source point's own normal m are independent of n, so a sum of
-/// m n' (kObserved) has no such part: the method of instrumental variables (Reiersol 1941). A shapeless correspondence
-/// is a ball.
+/// m n' (kObserved) has no such part: the method of instrumental variables (Reiersol 1941). Where m is unknown, n n'
+/// less the variance of n stands in for it. A shapeless correspondence is a ball.
 [[gnu::always_inline]] inline void compute_terms(const Affine& T, const SourceBlock& source, const MatchBlock& match,
                                                  const Axes& axes, float width2, std::size_t begin, Terms& terms) {
   const auto [R, t] = T;
@@ -104,15 +104,16 @@ using Sums = std::array<Lanes, kTerms>;
     terms[kBr + 1][k] = ty_ * r + wb * (z * dx - x * dz);
     terms[kBr + 2][k] = tz_ * r + wb * (x * dy - y * dx);
     const float hx = y * mz - z * my, hy = z * mx - x * mz, hz = x * my - y * mx;
+    const float noise = wp * rest * match.tilt_rad2[i];
     for (std::size_t side = 0; side < 3; ++side) {
       const float along_m = mx * axes[side][0] + my * axes[side][1] + mz * axes[side][2];
       const float along_n = nx * axes[side][0] + ny * axes[side][1] + nz * axes[side][2];
-      terms[kObserved + side][k] = wp * along_m * along_n + wb;
+      terms[kObserved + side][k] = wp * along_m * along_n - noise + wb;
       terms[kSides + side][k] = wp * std::abs(along_m);
     }
-    terms[kObserved + 3][k] = wp * gx * hx + wb * (y * y + z * z);
-    terms[kObserved + 4][k] = wp * gy * hy + wb * (z * z + x * x);
-    terms[kObserved + 5][k] = wp * gz * hz + wb * (x * x + y * y);
+    terms[kObserved + 3][k] = wp * gx * hx + (wb - noise) * (y * y + z * z);
+    terms[kObserved + 4][k] = wp * gy * hy + (wb - noise) * (z * z + x * x);
+    terms[kObserved + 5][k] = wp * gz * hz + (wb - noise) * (x * x + y * y);
     terms[kSides + 3][k] = wp * std::abs(hx);
     terms[kSides + 4][k] = wp * std::abs(hy);
     terms[kSides + 5][k] = wp * std::abs(hz);

@@ -45,7 +45,7 @@ using Symmetric = Symmetric3<float>;
 struct Fits {
   PerVoxel count, x, y, z, xx, xy, xz, yy, yz, zz; ///< sums over the points
   PerVoxel nxx, nxy, nxz, nyy, nyz, nzz;
-  PerVoxel mean_x, mean_y, mean_z, normal_x, normal_y, normal_z, variance_m2, strewn_m2;
+  PerVoxel mean_x, mean_y, mean_z, normal_x, normal_y, normal_z, variance_m2, tilt_rad2, strewn_m2;
 };
 
 /// Returns -1 for a plane, else 0; masks, since conditions would be branches.
@@ -94,6 +94,7 @@ struct Fits {
     f.normal_y[i] = best(points.y, discs.y);
     f.normal_z[i] = best(points.z, discs.z);
     f.variance_m2[i] = planar * least - (1.0F - planar);
+    f.tilt_rad2[i] = planar * share * least / std::max(best(points.middle, discs.middle), kPointVariance_m2);
     f.strewn_m2[i] = strewn * ((scatter.xx + scatter.yy + scatter.zz) / 3.0F + between_lines_m2 + kPointVariance_m2) -
                      (1.0F - strewn);
   }
@@ -324,6 +325,7 @@ void SurfaceGrid::fit(std::span<const std::uint32_t> slots) {
     voxels_[slots[i]].surface = {{fits.mean_x[i], fits.mean_y[i], fits.mean_z[i]},
                                  {fits.normal_x[i], fits.normal_y[i], fits.normal_z[i]},
                                  fits.variance_m2[i],
+                                 fits.tilt_rad2[i],
                                  moments_[slots[i]].shaped ? fits.strewn_m2[i] : std::min(0.0F, fits.strewn_m2[i])};
 }
 

@@ -29,6 +29,7 @@ struct Surface {
   Eigen::Vector3f mean_m = Eigen::Vector3f::Zero(); ///< relative to the centre of the voxel
   Eigen::Vector3f normal = Eigen::Vector3f::Zero(); ///< unit
   float variance_m2 = -1.0F;                        ///< along the normal; negative: no plane
+  float tilt_rad2 = 0.0F;                           ///< variance of the normal, about its least certain axis
   /// Variance of a point where there is no plane: that of the voxel's points about their mean, and of the space between
   /// scan lines. Negative: too few points; zero: all are of one sweep, and lie where its scan lines fell.
   float strewn_m2 = -1.0F;

@@ -52,7 +52,7 @@ TEST(Correspondences, PointNearAPlaneIsMatchedWithIt) {
   EXPECT_EQ(matches.found[0], 1.0F);
   EXPECT_NEAR(matches.z_m[0], 0.0, 0.01) << "mean of the surface";
   EXPECT_NEAR(std::abs(matches.normal_z[0]), 1.0, 0.01);
-  EXPECT_GT(matches.along_m2[0], 1e3F * matches.across_m2[0]) << "a plane constrains its normal only";
+  EXPECT_EQ(matches.tilt_rad2[0], map.fine().find({0, 0, 0})->tilt_rad2);
 }
 
 TEST(Correspondences, PoseMovesThePoints) {
@@ -138,7 +138,7 @@ TEST(Correspondences, ShapelessVoxelsServeOnlyIfAccepted) {
   pass.accepts_shapeless = true;
   const MatchBlock matches = matches_of(pass, source);
   EXPECT_EQ(matches.found[0], 1.0F);
-  EXPECT_EQ(matches.across_m2[0], matches.along_m2[0]) << "a ball";
+  EXPECT_EQ(matches.tilt_rad2[0], 0.0F) << "a ball";
   EXPECT_EQ(matches.normal_x[0] + matches.normal_y[0] + matches.normal_z[0], 0.0F);
   EXPECT_EQ(matches.unknown[0], 0.0F);
 }

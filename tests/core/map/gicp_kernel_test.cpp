@@ -35,7 +35,6 @@ struct MatchedPoints {
     matches.normal_y[i] = static_cast<float>(normal.y());
     matches.normal_z[i] = static_cast<float>(normal.z());
     matches.across_m2[i] = static_cast<float>(variance_m2);
-    matches.along_m2[i] = static_cast<float>(variance_m2);
     matches.found[i] = 1.0F;
   }
 };
@@ -140,6 +139,17 @@ TEST(GicpKernel, NoiseOfNormalsIsNotObserved) {
   EXPECT_NEAR(noisy.observed[1] / noisy.H(1, 1), 1.0, 0.1);
   const NormalEquations real = equations_of(rough_wall(true));
   EXPECT_NEAR(real.observed[0] / real.H(0, 0), 1.0, 1e-3) << "surfaces that face x";
+}
+
+TEST(GicpKernel, NoiseOfNormalsIsNotObservedWithoutASecondOne) {
+  MatchedPoints scene = rough_wall(true);
+  for (std::size_t i = 0; i < scene.points.size(); ++i) {
+    scene.points[i].normal.setZero();
+    scene.matches.tilt_rad2[i] = 0.1F * 0.1F;
+  }
+  const NormalEquations found = equations_of(scene);
+  EXPECT_LT(std::abs(found.observed[0]), 0.3 * found.H(0, 0));
+  EXPECT_NEAR(found.observed[1] / found.H(1, 1), 1.0, 0.1);
 }
 
 TEST(GicpKernel, PointWithoutANormalHasThatOfItsPlane) {

@@ -147,6 +147,38 @@ TEST(SurfaceGrid, ANoisyFloorAtHeightZeroIsOneLayerOfPlanes) {
   }
 }
 
+/// Returns the mean square of the normal's tilt about an axis over many floors of `count` noisy points each, and the
+/// mean of its variance as the voxels have it.
+std::pair<double, double> tilts_of_noisy_floors(int count) {
+  std::mt19937 random{3};
+  std::uniform_real_distribution<double> along{-0.24, 0.24};
+  std::normal_distribution<double> noise{0.0, 0.02};
+  double tilts_rad2 = 0.0, expected_rad2 = 0.0;
+  int planes = 0;
+  for (int floor = 0; floor < 400; ++floor) {
+    SurfaceGrid grid(kLeaf_m, 100'000);
+    for (int i = 0; i < count; ++i)
+      insert(grid, {along(random), along(random), noise(random)}, kNoNormal);
+    grid.refresh();
+    const Surface& surface = *grid.find({0, 0, 0});
+    if (!surface.planar())
+      continue;
+    ++planes;
+    tilts_rad2 += static_cast<double>(surface.normal.head<2>().squaredNorm()) / 2.0;
+    expected_rad2 += static_cast<double>(surface.tilt_rad2);
+  }
+  EXPECT_GT(planes, 350);
+  return {tilts_rad2 / planes, expected_rad2 / planes};
+}
+
+TEST(SurfaceGrid, NormalIsAsUncertainAsItsPointsSay) {
+  for (const int count : {12, 100}) {
+    const auto [tilts_rad2, expected_rad2] = tilts_of_noisy_floors(count);
+    EXPECT_GT(expected_rad2, tilts_rad2 / 1.5) << count;
+    EXPECT_LT(expected_rad2, tilts_rad2 * 1.5) << count;
+  }
+}
+
 TEST(SurfaceGrid, PlanesAreReadAllOrThoseWithinARadius) {
   SurfaceGrid grid(kLeaf_m, kEnoughBytes);
   insert(grid, {0, 0, 0.1}, Eigen::Vector3f::UnitZ());
