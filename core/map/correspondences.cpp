@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace locus {
 
@@ -207,7 +208,7 @@ void find_around(const GicpPass& pass, const Placed& points, std::size_t count, 
 
 } // namespace
 
-SourceBlock::SourceBlock(std::span<const SurfacePoint> points) : count(points.size()) {
+SourceBlock::SourceBlock(std::span<const SurfacePoint> points, std::span<const float> ages_s) : count(points.size()) {
   along_m2.fill(kPointVariance_m2);
   for (std::size_t i = 0; i < points.size(); ++i) {
     const bool finite = points[i].position_m.allFinite() && points[i].normal.allFinite();
@@ -219,6 +220,25 @@ SourceBlock::SourceBlock(std::span<const SurfacePoint> points) : count(points.si
     normal_y[i] = normal.y();
     normal_z[i] = normal.z();
     along_m2[i] = normal.isZero() ? kPointVariance_m2 : kAlongSourceVariance_m2;
+  }
+  scan_x_m = x_m;
+  scan_y_m = y_m;
+  scan_z_m = z_m;
+  if (ages_s.empty())
+    return;
+  const float mean_s = std::accumulate(ages_s.begin(), ages_s.end(), 0.0F) / static_cast<float>(count);
+  for (std::size_t i = 0; i < count; ++i)
+    younger_s[i] = mean_s - ages_s[i];
+  age_s = static_cast<double>(mean_s);
+}
+
+void SourceBlock::deskew(const Vector6& twist_change) {
+  const Eigen::Matrix<float, 6, 1> change = twist_change.cast<float>();
+  for (std::size_t i = 0; i < kGicpBlock; ++i) {
+    const float x = scan_x_m[i], y = scan_y_m[i], z = scan_z_m[i];
+    x_m[i] = x + younger_s[i] * (change[0] + change[4] * z - change[5] * y);
+    y_m[i] = y + younger_s[i] * (change[1] + change[5] * x - change[3] * z);
+    z_m[i] = z + younger_s[i] * (change[2] + change[3] * y - change[4] * x);
   }
 }
 

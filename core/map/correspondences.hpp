@@ -19,11 +19,19 @@ using PerPoint = std::array<float, kGicpBlock>;
 /// Points of a sweep, relative to the origin of their own frame. Entries beyond the last point are zero.
 struct SourceBlock {
   PerPoint x_m{}, y_m{}, z_m{};
+  PerPoint scan_x_m{}, scan_y_m{}, scan_z_m{}; ///< as in the scan, de-skewed for its twist
+  PerPoint younger_s{};                        ///< mean age of the block minus that of the point
   PerPoint normal_x{}, normal_y{}, normal_z{}; ///< zero if unreliable
   PerPoint along_m2{}; ///< variance along the surface; without a normal, that of the point itself
   std::size_t count = 0;
+  double age_s = 0.0; ///< mean over the points
 
-  explicit SourceBlock(std::span<const SurfacePoint> points);
+  /// `ages_s`: of each point; empty: all are zero.
+  explicit SourceBlock(std::span<const SurfacePoint> points, std::span<const float> ages_s = {});
+
+  /// Moves the points relative to one of mean age, for a base whose twist differs by `twist_change` (m/s, rad/s) from
+  /// that of the scan. To first order.
+  void deskew(const Vector6& twist_change);
 };
 
 /// Voxels that contain the points of a block.

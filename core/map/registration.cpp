@@ -133,6 +133,12 @@ struct ElasticEquations {
   }
 };
 
+/// Returns the block that begins at `begin`; empty beyond the end.
+template <class T> std::span<const T> block_at(std::size_t begin, std::span<const T> all) {
+  const std::span<const T> rest = all.subspan(std::min(begin, all.size()));
+  return rest.first(std::min(kGicpBlock, rest.size()));
+}
+
 } // namespace
 
 struct Gicp::Workers {
@@ -152,20 +158,19 @@ struct Gicp::Workers {
   void set_source(const ElasticScan& source) {
     blocks.clear();
     for (std::size_t begin = 0; begin < source.points.size(); begin += kGicpBlock)
-      blocks.emplace_back(source.points.subspan(begin, std::min(kGicpBlock, source.points.size() - begin)));
+      blocks.emplace_back(block_at(begin, source.points), block_at(begin, source.age_s));
     matches.resize(std::max(matches.size(), blocks.size()));
     fits.assign(blocks.size(), {});
     partial.resize(std::max(partial.size(), blocks.size()));
-    age_s.assign(blocks.size(), 0.0);
-    std::copy(source.block_age_s.begin(), source.block_age_s.end(), age_s.begin());
     twist_of_scan = source.twist_base;
   }
 
   /// Returns the pose of a block's frame in the target, for a base that moved with `twist_base`.
   [[nodiscard]] Pose place(std::size_t block, const Pose& T_target_source, const Vector6& twist_base) const {
-    if (age_s[block] == 0.0)
+    const double age_s = blocks[block].age_s;
+    if (age_s == 0.0)
       return T_target_source;
-    return T_target_source * se3_exp(-age_s[block] * twist_base) * se3_exp(age_s[block] * twist_of_scan);
+    return T_target_source * se3_exp(-age_s * twist_base) * se3_exp(age_s * twist_of_scan);
   }
 
   /// Runs one pass over all points, block by block in a fixed order of summation.
@@ -176,7 +181,10 @@ struct Gicp::Workers {
       return of_block;
     };
     if (pass.look_up != LookUp::reuse) {
-      for_each_block([&](std::size_t block) { find(of(block), blocks[block], matches[block], isa); });
+      for_each_block([&](std::size_t block) {
+        blocks[block].deskew(twist_base - twist_of_scan);
+        find(of(block), blocks[block], matches[block], isa);
+      });
       axes = axes_of(normals());
     }
     pass.axes = axes;
@@ -187,7 +195,7 @@ struct Gicp::Workers {
     const Matrix6 R_target_base = turn_both(pass.T_target_source.rotation);
     ElasticEquations total;
     for (std::size_t block = 0; block < blocks.size(); ++block)
-      total.add(partial[block], age_s[block], R_target_base);
+      total.add(partial[block], blocks[block].age_s, R_target_base);
     total.complete(pass.axes, R_target_base);
     return total;
   }
@@ -242,7 +250,6 @@ struct Gicp::Workers {
   std::vector<MatchBlock> matches;
   std::vector<FitBlock> fits;
   std::vector<NormalEquations> partial;
-  std::vector<double> age_s; ///< age of each block
   Axes axes{};
   Vector6 twist_of_scan = Vector6::Zero();
 };

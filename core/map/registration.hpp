@@ -25,8 +25,8 @@ using Matrix12 = Eigen::Matrix<double, 12, 12>;
 /// Points of a sweep recorded while the base moved. They are de-skewed to the end of the sweep for `twist_base`; for
 /// another twist each point moves according to its age.
 struct ElasticScan {
-  std::span<const SurfacePoint> points{}; ///< sorted by age
-  std::span<const float> block_age_s{};   ///< mean age of each block of kGicpBlock points; empty: all are zero
+  std::span<const SurfacePoint> points{}; ///< sorted by age, so that those of a block of kGicpBlock are of similar age
+  std::span<const float> age_s{};         ///< of each point; empty: all are zero
   Vector6 twist_base = Vector6::Zero();   ///< m/s and rad/s
 };
 
@@ -92,9 +92,10 @@ double evidence(const Registration& one, const Registration& other);
 ///
 /// Minimises the sum of robust d' (C_target + R C_source R')^-1 d by Gauss-Newton over the pose at the end of the sweep
 /// and the twist during it; a plane constrains its normal only. The Jacobian of a point of age a with respect to the
-/// twist is -a times that with respect to the pose; a block of points has one age. One pass over the points finds the
-/// correspondences and sums the normal equations. The sums are taken over fixed blocks of points in a fixed order: same
-/// input, same bits, for any number of threads. One owner.
+/// twist is -a times that with respect to the pose, a the mean age of its block; with each search for correspondences
+/// the points move with the twist by their own ages. One pass over the points finds the correspondences and sums the
+/// normal equations. The sums are taken over fixed blocks of points in a fixed order: same input, same bits, for any
+/// number of threads. One owner.
 class Gicp {
  public:
   using StopRequested = std::function<bool()>; ///< polled between iterations; true stops after at least one iteration

@@ -20,15 +20,13 @@ ElasticScan AgedScan::sort(const Sweep& sweep, std::span<const SurfacePoint> sca
   for (std::size_t b = 0; b < kBins; ++b)
     begins[b + 1] += begins[b];
   points_base_.resize(count);
-  block_age_s_.assign((count + kGicpBlock - 1) / kGicpBlock, 0.0F);
+  age_s_.resize(count);
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t place = begins[bin(i)]++;
     points_base_[place] = scan_base[i];
-    block_age_s_[place / kGicpBlock] += sweep.points[i].age_s;
+    age_s_[place] = sweep.points[i].age_s;
   }
-  for (std::size_t b = 0; b < block_age_s_.size(); ++b)
-    block_age_s_[b] /= static_cast<float>(std::min(kGicpBlock, count - b * kGicpBlock));
-  return {.points = points_base_, .block_age_s = block_age_s_, .twist_base = twist_base};
+  return {.points = points_base_, .age_s = age_s_, .twist_base = twist_base};
 }
 
 } // namespace locus

@@ -11,8 +11,8 @@
 
 namespace locus {
 
-/// Registered points of a sweep sorted by age, as input to the elastic registration: a block of points has one age.
-/// Reuses its memory. One owner.
+/// Registered points of a sweep sorted by age, as input to the elastic registration: those of a block are of similar
+/// age. Reuses its memory. One owner.
 class AgedScan {
  public:
   /// Sorts `scan_base`: the points of the sweep, in its order, de-skewed for `twist_base` (m/s, rad/s) to its end. The
@@ -21,7 +21,7 @@ class AgedScan {
 
  private:
   std::vector<SurfacePoint> points_base_;
-  std::vector<float> block_age_s_;
+  std::vector<float> age_s_;
 };
 
 } // namespace locus

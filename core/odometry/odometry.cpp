@@ -16,9 +16,6 @@ namespace {
 /// Standard deviation of the prior position above which correspondences are searched in all voxels around a point.
 constexpr double kWide_m = 0.3;
 
-/// Change of the twist above which the points are de-skewed again: it distorts a block of points.
-constexpr double kDistorts_mps = 0.3, kDistorts_radps = 0.05;
-
 /// Capacity for the 16 000 voxels of a large sweep that still fits the L2 cache.
 constexpr std::size_t kLastScanBytes = 2'500'000;
 
@@ -222,7 +219,8 @@ void Odometry::match_last(const Sweep& sweep, const MotionBelief& belief, Hypoth
   hypothesis.scan_to_scan.T_target_source = filter_.pose().inverse() * found.T_target_source;
 }
 
-/// Registers the sweep with the submap, starting from the hypothesis.
+/// Registers the sweep with the submap, starting from the hypothesis. A registration that does not converge goes on
+/// once more from where it stopped, with the points de-skewed for the motion found so far.
 void Odometry::register_with(const Sweep& sweep, Hypothesis& hypothesis, const Gicp::StopRequested& stop) {
   MotionBelief belief = hypothesis.filter.belief();
   RegistrationOptions options = options_.scan_to_submap;
@@ -235,7 +233,8 @@ void Odometry::register_with(const Sweep& sweep, Hypothesis& hypothesis, const G
   hypothesis.fit = {};
   hypothesis.fit.T_target_source = belief.T_target_source;
   hypothesis.fit.twist_base = belief.twist_base;
-  correct(sweep, belief.twist_base, hypothesis.rests ? kAllSources : hypothesis.without);
+  const std::bitset<kMaxSources> without = hypothesis.rests ? kAllSources : hypothesis.without;
+  correct(sweep, belief.twist_base, without);
   if (sweep.points.size() < kMinPoints)
     return;
   if (has_last_scan_ && !hypothesis.rests)
@@ -246,13 +245,10 @@ void Odometry::register_with(const Sweep& sweep, Hypothesis& hypothesis, const G
       (!hypothesis.rests && hypothesis.filter.covariance().diagonal().head<3>().maxCoeff() > kWide_m * kWide_m);
   const Pose T_start = hypothesis.fit.T_target_source;
   hypothesis.fit = gicp_.align(aged_.sort(sweep, scan_, belief.twist_base), map_, T_start, belief, options, wide, stop);
-  const Vector6 twist_change = (hypothesis.fit.twist_base - belief.twist_base).cwiseAbs();
-  const bool is_distorted =
-      twist_change.head<3>().maxCoeff() >= kDistorts_mps || twist_change.tail<3>().maxCoeff() >= kDistorts_radps;
-  if (!is_distorted || stop())
+  if (hypothesis.fit.converged || stop())
     return;
   const int before = hypothesis.fit.iterations;
-  correct(sweep, hypothesis.fit.twist_base, hypothesis.without);
+  correct(sweep, hypothesis.fit.twist_base, without);
   hypothesis.fit = gicp_.align(aged_.sort(sweep, scan_, hypothesis.fit.twist_base), map_,
                                hypothesis.fit.T_target_source, belief, options, false, stop);
   hypothesis.fit.iterations += before;

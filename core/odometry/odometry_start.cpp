@@ -184,7 +184,7 @@ Odometry::Start Odometry::start_without(std::bitset<kMaxSources> without, const 
     last_scan_map_.clear();
     last_scan_map_.insert(scan_, T_odom_first);
     correct(sweep, twist, unused);
-    const ElasticScan rigid{.points = std::span(scan_).first(sweep.registered), .block_age_s = {}, .twist_base = twist};
+    const ElasticScan rigid{.points = std::span(scan_).first(sweep.registered), .age_s = {}, .twist_base = twist};
     RegistrationOptions options = options_.scan_to_scan;
     options.max_iterations = std::min(options.max_iterations, iterations);
     return gicp_.align(rigid, last_scan_map_, T_start, belief, options, iterations > 4, stop);

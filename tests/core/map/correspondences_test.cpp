@@ -204,5 +204,29 @@ TEST(Correspondences, AreTheSameForEveryInstructionSet) {
   }
 }
 
+/// A point of age a, de-skewed for the scan's twist s, is at exp(-a x) exp(a s) of where it was, for the twist x.
+TEST(SourceBlock, PointsMoveWithTheTwistByTheirOwnAges) {
+  const Vector6 of_scan = (Vector6() << 1.0, 0.2, 0.0, 0.1, -0.2, 0.3).finished();
+  const Vector6 found = of_scan + (Vector6() << -0.4, 0.3, 0.1, 0.1, 0.2, -1.0).finished();
+  const std::vector<float> ages_s{0.040F, 0.044F, 0.047F, 0.053F};
+  const std::vector<Eigen::Vector3f> positions_m{{8, 3, -1}, {-5, 6, 2}, {0, -9, 1}, {2, 2, 0}};
+  std::vector<SurfacePoint> points;
+  for (const Eigen::Vector3f& position_m : positions_m)
+    points.push_back({position_m, Eigen::Vector3f::Zero()});
+  SourceBlock block(points, ages_s);
+  EXPECT_NEAR(block.age_s, 0.046, 1e-6);
+  block.deskew(found - of_scan);
+  const auto shift = [&](double age_s) { return se3_exp(-age_s * found) * se3_exp(age_s * of_scan); };
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3d moved_m{static_cast<double>(block.x_m[i]), static_cast<double>(block.y_m[i]),
+                                  static_cast<double>(block.z_m[i])};
+    const Eigen::Vector3d scan_m = positions_m[i].cast<double>();
+    const double change_m = (shift(static_cast<double>(ages_s[i])) * scan_m - shift(block.age_s) * scan_m).norm();
+    EXPECT_LT((shift(block.age_s) * moved_m - shift(static_cast<double>(ages_s[i])) * scan_m).norm(), 0.1 * change_m);
+  }
+  block.deskew(Vector6::Zero());
+  EXPECT_EQ(block.x_m[0], 8.0F) << "moved from where the scan has it, not from the last place";
+}
+
 } // namespace
 } // namespace locus

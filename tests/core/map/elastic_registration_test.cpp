@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <random>
-#include <utility>
 #include <vector>
 
 #include "core/map/registration.hpp"
@@ -33,12 +32,13 @@ struct SweepOfARoom {
   std::vector<float> ages_s;
   Vector6 assumed;
 
-  SweepOfARoom(std::vector<float> of_blocks_s, const Vector6& with_twist, unsigned seed = 2)
-      : ages_s(std::move(of_blocks_s)), assumed(with_twist) {
+  SweepOfARoom(const std::vector<float>& of_blocks_s, const Vector6& with_twist, unsigned seed = 2)
+      : assumed(with_twist) {
     std::vector<SurfacePoint> all = test::points_on(test::furnished_room(), 400, seed, 0.005);
     std::shuffle(all.begin(), all.end(), std::mt19937{seed}); // each block sees the whole room
-    for (std::size_t block = 0; block < ages_s.size(); ++block) {
-      const auto age_s = static_cast<double>(ages_s[block]);
+    for (std::size_t block = 0; block < of_blocks_s.size(); ++block) {
+      ages_s.insert(ages_s.end(), kGicpBlock, of_blocks_s[block]);
+      const auto age_s = static_cast<double>(of_blocks_s[block]);
       const Pose T_room_then = kTrueEnd * se3_exp(-age_s * kTrueTwist);
       const auto first = all.begin() + static_cast<std::ptrdiff_t>(block * kGicpBlock);
       const std::vector<SurfacePoint> then = test::seen_from(T_room_then, {first, first + std::ptrdiff_t{kGicpBlock}});

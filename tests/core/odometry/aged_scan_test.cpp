@@ -58,18 +58,13 @@ TEST(AgedScan, PointsAreSortedByAgeAndNoneIsLost) {
   EXPECT_EQ(sorted.twist_base, kScanTwist);
 }
 
-TEST(AgedScan, AgeOfABlockIsTheMeanOfItsPoints) {
-  const std::vector<float> ages_s = random_ages(700); // the last block is not full
+TEST(AgedScan, EachPointHasItsAge) {
+  const std::vector<float> ages_s = random_ages(700);
   AgedScan aged;
   const ElasticScan sorted = aged.sort(sweep_of_ages(ages_s), numbered_scan(700), kScanTwist);
-  ASSERT_EQ(sorted.block_age_s.size(), 3U);
-  for (std::size_t block = 0; block < 3; ++block) {
-    const std::size_t begin = block * kGicpBlock, end = std::min<std::size_t>(begin + kGicpBlock, 700);
-    double sum = 0.0;
-    for (std::size_t i = begin; i < end; ++i)
-      sum += static_cast<double>(ages_s[number_of(sorted.points[i])]);
-    EXPECT_NEAR(static_cast<double>(sorted.block_age_s[block]), sum / static_cast<double>(end - begin), 1e-6);
-  }
+  ASSERT_EQ(sorted.age_s.size(), 700U);
+  for (std::size_t i = 0; i < 700; ++i)
+    EXPECT_EQ(sorted.age_s[i], ages_s[number_of(sorted.points[i])]);
 }
 
 TEST(AgedScan, PointsOfOneAgeRetainTheirOrder) {
@@ -86,7 +81,7 @@ TEST(AgedScan, OnlyTheRegisteredPointsAreSorted) {
   AgedScan aged;
   const ElasticScan sorted = aged.sort(sweep, numbered_scan(700), kScanTwist);
   ASSERT_EQ(sorted.points.size(), 100U);
-  EXPECT_EQ(sorted.block_age_s.size(), 1U);
+  EXPECT_EQ(sorted.age_s.size(), 100U);
   for (const SurfacePoint& point : sorted.points)
     EXPECT_LT(number_of(point), 100U);
 }
@@ -98,8 +93,7 @@ TEST(AgedScan, ASmallerSweepLeavesNothingOfALargerOne) {
   ASSERT_EQ(sorted.points.size(), 2U);
   EXPECT_EQ(number_of(sorted.points[0]), 1U);
   EXPECT_EQ(number_of(sorted.points[1]), 0U);
-  ASSERT_EQ(sorted.block_age_s.size(), 1U);
-  EXPECT_NEAR(static_cast<double>(sorted.block_age_s[0]), 0.02, 1e-6);
+  EXPECT_EQ(std::vector(sorted.age_s.begin(), sorted.age_s.end()), (std::vector{0.01F, 0.03F}));
   EXPECT_TRUE(aged.sort(sweep_of_ages({}), {}, kScanTwist).points.empty());
 }
 
