@@ -108,7 +108,7 @@ template <class Section> void fields(Section& section, BodyBoxOptions& options) 
 
 template <class Section> void fields(Section& section, SegmentFilterOptions& options) {
   section.key("enabled", options.enabled);
-  section.key("points", options.points);
+  section.key_or("points", options.points, "auto");
 }
 
 template <class Section> void fields(Section& section, VoxelFilterOptions& options) {

@@ -21,7 +21,8 @@ std::optional<std::string> SweepOptions::problem() const {
                    "must be [nearest, farthest] with 0 <= nearest < farthest <= 1000");
   problems.require(!body_box.enabled || (body_box.min_m.array() < body_box.max_m.array()).all(), "body_box.max_m",
                    "each of its three numbers must be greater than that of min_m");
-  problems.require_range<std::size_t>("segment_filter.points", segment_filter.points, 100, 1'000'000);
+  if (segment_filter.points)
+    problems.require_range<std::size_t>("segment_filter.points", *segment_filter.points, 100, 1'000'000);
   problems.require_range("voxel_filter.leaf_m", voxel_filter.leaf_m, 0.01, 10.0);
   problems.require_range("random_filter.keep", random_filter.keep, 0.001, 1.0);
   return problems.result();

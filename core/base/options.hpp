@@ -34,7 +34,7 @@ struct BodyBoxOptions { ///< returns inside the box come from the robot itself a
 
 struct SegmentFilterOptions { ///< centroids of short arcs of each ring, in firing order; its leaf follows the scene
   bool enabled = true;
-  std::size_t points = 2000; ///< target per sweep
+  std::optional<std::size_t> points; ///< target per sweep; nothing: 2000, or 50 per scan line if more (key: auto)
 
   bool operator==(const SegmentFilterOptions&) const = default;
 };

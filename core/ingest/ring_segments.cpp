@@ -13,6 +13,11 @@ namespace {
 /// lies on no surface.
 constexpr float kMaxBend_m = 0.04F;
 
+/// Points wanted of a sweep, unless their number is requested: with many lines, 2000 points are so few per line that
+/// the choice of them moves the estimate by millimetres.
+constexpr std::size_t kPoints = 2000;
+constexpr std::size_t kPointsPerLine = 50;
+
 constexpr std::size_t kLinesPerLidar = 256;
 constexpr float kFirstLeaf_m = 0.1F;
 constexpr float kMinLeaf_m = 0.05F;
@@ -38,9 +43,9 @@ template <class Visit> void for_each_set(std::uint32_t bits, const Visit& visit)
 
 } // namespace
 
-RingSegments::RingSegments(std::size_t lidars, std::size_t points_wanted, Isa isa)
-    : isa_(isa), points_wanted_(points_wanted), leaf_m_(kFirstLeaf_m), lidars_(lidars),
-      line_begin_(lidars * kLinesPerLidar + 1) {
+RingSegments::RingSegments(std::size_t lidars, std::optional<std::size_t> points_wanted, Isa isa)
+    : isa_(isa), points_requested_(points_wanted), points_wanted_(points_wanted.value_or(kPoints)),
+      leaf_m_(kFirstLeaf_m), lidars_(lidars), line_begin_(lidars * kLinesPerLidar + 1) {
   segments_.reserve(kMaxSegments);
   place_.reserve(kMaxSegments);
 }
@@ -164,6 +169,8 @@ void RingSegments::finish(float duration_s, std::vector<SweepPoint>& points) {
   std::fill(line_begin_.begin(), line_begin_.end(), 0U);
   for (const Segment& segment : segments_)
     ++line_begin_[segment.point.scan_line + 1U];
+  const auto lines = line_begin_.size() - static_cast<std::size_t>(std::ranges::count(line_begin_, 0U));
+  points_wanted_ = points_requested_.value_or(std::max(kPoints, kPointsPerLine * lines));
   for (std::size_t i = 1; i < line_begin_.size(); ++i)
     line_begin_[i] += line_begin_[i - 1];
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -32,14 +33,15 @@ struct PacketMotion {
 /// A segment ends when it is longer than the leaf, when the range jumps to another surface, and when the laser has had
 /// no return for a whole packet. It lasts a few milliseconds at most, so its returns are averaged in the frame of the
 /// lidar, and only the centroid is corrected for motion, at their mean time of firing. The leaf adapts from sweep to
-/// sweep so that the number of segments is about the requested one. Memory is fixed at construction. One owner.
+/// sweep so that the number of segments is about points_wanted(). Memory is fixed at construction. One owner.
 class RingSegments {
  public:
   static constexpr std::size_t kMaxSegments = 65536;
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
   using Mask = FiringGroup::PerLaser<std::int32_t>; ///< -1 for a selected return, 0 for any other
 
-  RingSegments(std::size_t lidars, std::size_t points_wanted, Isa isa = best_isa());
+  /// `points_wanted` per sweep; nothing: as many as the scan lines of each sweep ask for.
+  RingSegments(std::size_t lidars, std::optional<std::size_t> points_wanted, Isa isa = best_isa());
 
   /// Sets the motion of the lidar. Must be called before the firing groups of each packet.
   void begin_packet(std::size_t lidar, const PacketMotion& motion);
@@ -55,6 +57,9 @@ class RingSegments {
   /// goes round a corner.
   void finish(float duration_s, std::vector<SweepPoint>& points);
   [[nodiscard]] std::uint32_t place_of(std::uint32_t segment) const { return place_[segment]; }
+
+  /// Returns the number of points that registration should use of the latest finished sweep.
+  [[nodiscard]] std::size_t points_wanted() const { return points_wanted_; }
 
  private:
   /// Open segments of sixteen lasers.
@@ -88,6 +93,7 @@ class RingSegments {
   void close(std::size_t lidar, Bank& bank, std::size_t laser);
 
   Isa isa_;
+  std::optional<std::size_t> points_requested_;
   std::size_t points_wanted_;
   float leaf_m_;
   std::vector<Lidar> lidars_;

@@ -26,8 +26,6 @@ constexpr Duration kLateToRestart = std::chrono::milliseconds{500};
 /// sweeps go back only by more.
 constexpr Duration kLatestThatIsWaitedFor = std::chrono::seconds{2};
 
-constexpr std::size_t kReturnsPerSegmentPoint = 4; ///< headroom until the leaf has adapted
-
 /// Selects the returns of a firing group: -1 for one fired in [first_ns, last_ns) and within range, else 0. Adds the
 /// number fired in that time to `fired`.
 RingSegments::Mask select(const FiringGroup& group, std::int32_t first_ns, std::int32_t last_ns, float min_range_m,
@@ -80,8 +78,7 @@ SweepBuilder::SweepBuilder(const SweepOptions& options, std::vector<Pose> T_base
       normals_(RingSegments::kMaxSegments, options.isa),
       voxel_filter_(options.voxel_filter, options.voxel_filter.enabled ? max_returns : 0),
       random_filter_(options.random_filter, options.seed) {
-  const std::size_t points =
-      options.segment_filter.enabled ? kReturnsPerSegmentPoint * options.segment_filter.points : max_returns;
+  const std::size_t points = options.segment_filter.enabled ? RingSegments::kMaxSegments : max_returns;
   sweep_.points.reserve(std::min(points, max_returns));
   if (keeps_singly())
     raw_.reserve(max_returns);
@@ -305,7 +302,7 @@ void SweepBuilder::reduce(float duration_s) {
   if (options_.random_filter.enabled)
     random_filter_.apply(sweep_.points);
   sweep_.registered = sweep_.points.size();
-  if (options_.segment_filter.enabled && sweep_.points.size() > options_.segment_filter.points)
+  if (options_.segment_filter.enabled && sweep_.points.size() > segments_.points_wanted())
     choose_registered();
 }
 
@@ -325,19 +322,28 @@ void SweepBuilder::copy_returns(float duration_s) {
     sweep_.returns = sweep_.points;
 }
 
-/// Moves the requested number of points to the front, evenly selected along the scan lines.
+/// Moves the requested number of points to the front, or slightly fewer, evenly selected along each scan line. A line
+/// starts at a phase of its own, not at that where the last one ended: a single point more, due to rounding, would
+/// change most of the choice on all later lines, and the registration by a millimetre.
 void SweepBuilder::choose_registered() {
-  const std::size_t wanted = options_.segment_filter.points;
+  constexpr std::size_t kGolden = 40503, kOne = 65536; // the golden ratio spreads the phases evenly
+  const std::size_t wanted = segments_.points_wanted();
   const std::size_t total = sweep_.points.size();
   unregistered_.clear();
   sweep_.registered = 0;
+  std::size_t phase = 0; // of `total`
   for (std::size_t i = 0; i < total; ++i) {
-    if ((i + 1) * wanted / total != i * wanted / total)
+    const std::size_t line = sweep_.points[i].scan_line;
+    if (i == 0 || line != sweep_.points[i - 1].scan_line)
+      phase = line * kGolden % kOne * total / kOne;
+    phase += wanted;
+    if (phase >= total && sweep_.registered < wanted)
       sweep_.points[sweep_.registered++] = sweep_.points[i];
     else
       unregistered_.push_back(sweep_.points[i]);
+    phase %= total;
   }
-  std::copy(unregistered_.begin(), unregistered_.end(), sweep_.points.begin() + static_cast<std::ptrdiff_t>(wanted));
+  std::ranges::copy(unregistered_, sweep_.points.begin() + static_cast<std::ptrdiff_t>(sweep_.registered));
 }
 
 void SweepBuilder::move_to_end() {

@@ -281,6 +281,7 @@ TEST(ConfigYaml, EveryKindOfBadValueIsRejectedWithItsKeyAndReason) {
       {"range_m=[0.5, 100, 200]", "must be a list of 2 finite numbers"},
       {"body_box={enabled: true}", "must be greater"},
       {"segment_filter.points=99", "is outside 100 .. 1000000"},
+      {"segment_filter.points=many", "or auto"},
       {"voxel_filter.leaf_m=.nan", "must be a finite number"},
       {"voxel_filter.leaf_m=1e999", "must be a finite number"},
       {"voxel_filter.leaf_m=0", "is outside 0.01 .. 10"},

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 namespace locus {
@@ -119,6 +120,21 @@ TEST(RingSegments, LeafAdaptsToTheRequestedNumber) {
   }
   EXPECT_GT(points.size(), 800U);
   EXPECT_LT(points.size(), 1300U);
+}
+
+TEST(RingSegments, WantsFiftyPointsOfEachScanLineUnlessTheyAreRequested) {
+  std::vector<SweepPoint> points;
+  const auto wanted_of = [&](RingSegments segments, std::uint16_t lines) {
+    for (std::uint16_t line = 0; line < lines; ++line)
+      scan(segments, line, tank);
+    segments.finish(kSweep_s, points);
+    return segments.points_wanted();
+  };
+  EXPECT_EQ(wanted_of({1, std::nullopt}, 0), 2000U);
+  EXPECT_EQ(wanted_of({1, std::nullopt}, 16), 2000U);
+  EXPECT_EQ(wanted_of({1, std::nullopt}, 64), 3200U);
+  EXPECT_EQ(wanted_of({1, std::nullopt}, 128), 6400U);
+  EXPECT_EQ(wanted_of({1, 1000}, 128), 1000U);
 }
 
 TEST(RingSegments, NoCentroidCutsACorner) {

@@ -4,6 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <iterator>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -52,6 +55,35 @@ TEST(SweepBuilder, PointsBeyondTheMemoryAreCounted) {
   ASSERT_FALSE(built.sweeps.empty());
   EXPECT_EQ(built.sweeps.front().points.size(), 10'000U);
   EXPECT_GE(built.builder.counters().overflowed_points, built.sweeps.front().raw_returns - 10'000);
+}
+
+/// Returns the numbers of the registered points of the first sweep, in which every return is a segment of its own.
+std::set<std::size_t> registered_numbers(const BodyBoxOptions& dropped) {
+  SweepOptions options;
+  options.segment_filter.points = 500;
+  options.max_range_m = 1e6;
+  options.body_box = dropped;
+  NumberedLidar lidar;
+  Built built(options);
+  built.play(lidar, milliseconds{150});
+  std::set<std::size_t> numbers;
+  for (std::size_t i = 0; i < built.sweeps.front().registered; ++i)
+    numbers.insert(number_of(built.sweeps.front().points[i]));
+  return numbers;
+}
+
+TEST(SweepBuilder, OnePointLessHardlyChangesTheRegisteredPointsOfOtherScanLines) {
+  constexpr std::size_t kDropped = 163;
+  const std::set<std::size_t> all = registered_numbers({});
+  const std::set<std::size_t> others =
+      registered_numbers({.enabled = true, .min_m = {kDropped - 0.5, -1, -1}, .max_m = {kDropped + 0.5, 1, 1}});
+  EXPECT_NEAR(static_cast<double>(all.size()), 500, 10);
+  std::vector<std::size_t> replaced;
+  std::ranges::set_difference(all, others, std::back_inserter(replaced));
+  EXPECT_FALSE(replaced.empty()) << "dropped " << kDropped;
+  const auto on_other_lines = std::ranges::count_if(
+      replaced, [](std::size_t number) { return number % FiringGroup::kLasers != kDropped % FiringGroup::kLasers; });
+  EXPECT_LE(on_other_lines, 25) << "a twentieth of them";
 }
 
 TEST(SweepBuilder, SinkMayMoveThePointsOut) {
