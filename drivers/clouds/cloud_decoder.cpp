@@ -19,7 +19,9 @@ constexpr Duration kLongestSlice = std::chrono::microseconds{1330}; ///< duratio
 /// Span of the firings of a cloud of one instant. They need an order, from which the neighbours of a point on other
 /// rings are found; a robot moves by less than the lidar's noise in this time.
 constexpr Duration kInstant = std::chrono::microseconds{50};
-constexpr std::size_t kBuckets = std::size_t{1} << 16;
+/// Buckets of the sort by time: enough that two points rarely share one.
+constexpr std::size_t kBucketsPerPoint = 16;
+constexpr std::size_t kMaxBuckets = std::size_t{1} << 16;
 constexpr double kTurn_rad = 2 * std::numbers::pi;
 constexpr double kCdegPerTurn = 36000;
 
@@ -58,7 +60,7 @@ CloudDecoder::CloudDecoder(std::uint8_t lidar, PointTimesFrom times) : times_fro
   points_.laser.reserve(kMaxCloudPoints);
   points_.offset_ns.reserve(kMaxCloudPoints);
   points_.order.reserve(kMaxCloudPoints);
-  buckets_.resize(kBuckets + 1);
+  buckets_.reserve(kMaxBuckets + 1);
 }
 
 CloudError CloudDecoder::refuse(CloudError error) {
@@ -356,14 +358,15 @@ void CloudDecoder::measure_period(Stamp arrival) {
   last_begin_ = cloud_.begin;
 }
 
-/// Sorts by time with a counting sort: resolution 1/65536 of the cloud, stable within a bucket.
+/// Sorts by time with a counting sort, stable within a bucket.
 void CloudDecoder::sort_by_time() {
   const std::size_t count = points_.offset_ns.size();
+  const std::size_t buckets = std::min(kMaxBuckets, kBucketsPerPoint * count);
   const auto length_ns = static_cast<std::uint64_t>((cloud_.end - cloud_.begin).count());
   const auto bucket_of = [&](std::size_t i) {
-    return static_cast<std::size_t>(static_cast<std::uint64_t>(points_.offset_ns[i]) * kBuckets / length_ns);
+    return static_cast<std::size_t>(static_cast<std::uint64_t>(points_.offset_ns[i]) * buckets / length_ns);
   };
-  std::ranges::fill(buckets_, 0U);
+  buckets_.assign(buckets + 1, 0U);
   for (std::size_t i = 0; i < count; ++i)
     ++buckets_[bucket_of(i) + 1];
   std::partial_sum(buckets_.begin(), buckets_.end(), buckets_.begin());
