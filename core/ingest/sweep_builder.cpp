@@ -331,7 +331,7 @@ void SweepBuilder::choose_registered() {
   const std::size_t total = sweep_.points.size();
   unregistered_.clear();
   sweep_.registered = 0;
-  std::size_t phase = 0; // of `total`
+  std::size_t phase = 0; // how far the next point is due, 0 .. total
   for (std::size_t i = 0; i < total; ++i) {
     const std::size_t line = sweep_.points[i].scan_line;
     if (i == 0 || line != sweep_.points[i - 1].scan_line)

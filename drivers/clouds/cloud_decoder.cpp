@@ -19,7 +19,8 @@ constexpr Duration kLongestSlice = std::chrono::microseconds{1330}; ///< duratio
 /// Span of the firings of a cloud of one instant. They need an order, from which the neighbours of a point on other
 /// rings are found; a robot moves by less than the lidar's noise in this time.
 constexpr Duration kInstant = std::chrono::microseconds{50};
-/// Buckets of the sort by time: enough that two points rarely share one.
+/// Resolution of the sort by time: a sixteenth of the mean interval between points, or 1/65536 of the cloud if that is
+/// longer.
 constexpr std::size_t kBucketsPerPoint = 16;
 constexpr std::size_t kMaxBuckets = std::size_t{1} << 16;
 constexpr double kTurn_rad = 2 * std::numbers::pi;
