@@ -83,7 +83,7 @@ class Odometry {
 
   /// Changes of the yaw rate that are tried lie this far apart, and standard deviation of the rate about them. A
   /// registration that searches all voxels around each point finds a rate from 2.4 rad/s away.
-  static constexpr double kTurnStep_radps = 1.2, kTurnSigma_radps = 0.6;
+  static constexpr double kTurnStep_radps = 0.6, kTurnSigma_radps = 0.6;
 
   /// An assumption on the motion during a sweep and on the sources that measure it.
   struct Assumption {

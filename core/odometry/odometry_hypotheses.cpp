@@ -41,7 +41,7 @@ constexpr double kSlipsFrom_mps2 = 2.0;
 /// Prior odds, as twice their logarithm, that no turn begins or ends in a sweep; largest change of the yaw rate in a
 /// sweep that is considered, in steps: people with a lidar in their hands turn on their heel at 5 rad/s.
 constexpr double kKeepsTurning = 9.2;
-constexpr int kMostTurnSteps = 4;
+constexpr int kMostTurnSteps = 8;
 
 /// Standard deviation of the shift that moving objects cause in the position of a robot that stands (chosen, not
 /// measured: docs/decisions/054).
