@@ -1,24 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
 // Hand-over of sweeps to a viewer, and the command that serves them to a browser.
+#include <algorithm>
 #include <array>
+#include <chrono>
 #include <csignal>
 #include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <thread>
 
 #include <fmt/format.h>
 #include <sys/socket.h>
+#include <sys/un.h>
 
 #include "core/base/surface_point.hpp"
 #include "daemon/descriptor.hpp"
 #include "drivers/net/socket_address.hpp"
+#include "locus_replay/failure.hpp"
 #include "locusctl/service_client.hpp"
 #include "service/robot_network.hpp"
 
 namespace locus::test {
 namespace {
+
+using namespace std::chrono_literals;
 
 class View : public RobotNetwork {
  protected:
@@ -74,6 +81,75 @@ TEST_F(View, BeforeTheFirstSweepTheStatusIsHandedOutAlone) {
   EXPECT_EQ(answer.json["status"]["state"], "waiting");
   EXPECT_FALSE(answer.json.contains("sweep"));
   EXPECT_TRUE(answer.bytes.empty());
+}
+
+/// Two viewers: one requests without a pause, the other requests as often and never reads an answer.
+class Viewers {
+ public:
+  explicit Viewers(const std::filesystem::path& control)
+      : control_(control), silent_(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    control.native().copy(address.sun_path, sizeof(address.sun_path) - 1);
+    EXPECT_EQ(connect(silent_.number(), reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
+    thread_ = std::jthread{[this](const std::stop_token& stop) {
+      while (!stop.stop_requested())
+        try {
+          view(stop);
+        } catch (const tools::Failure&) { // an answer took seconds on a busy computer: connects again
+        }
+    }};
+  }
+
+  /// Ends both. Returns the number of sweeps that the first was shown.
+  int end() {
+    thread_.request_stop();
+    thread_.join();
+    return sweeps_;
+  }
+
+ private:
+  void view(const std::stop_token& stop) {
+    const tools::ServiceConnection service(control_);
+    std::uint64_t last = 0;
+    while (!stop.stop_requested()) {
+      constexpr std::string_view kRequest = R"({"command":"view"})";
+      ::send(silent_.number(), kRequest.data(), kRequest.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+      const auto answer = service.request({{"command", "view"}}).json;
+      const std::uint64_t sequence = answer.contains("sweep") ? answer["sweep"]["sequence"].get<std::uint64_t>() : last;
+      sweeps_ += sequence == last ? 0 : 1;
+      last = sequence;
+    }
+  }
+
+  std::filesystem::path control_;
+  daemon::Descriptor silent_;
+  int sweeps_ = 0;
+  std::jthread thread_; ///< last: uses the others
+};
+
+TEST_F(View, ViewersNeitherDelayNorChangeAnEstimate) {
+  const std::filesystem::path drive = plant();
+  const Child daemon(led_locusd(drive / "config.yaml"));
+  const Child listener({CYCLONE_PEER, "0", "listen", "/locus"});
+  ASSERT_TRUE(hears_the_service(listener));
+  Viewers viewers(control());
+  Child play(leading_play({drive.string()}));
+  ASSERT_EQ(play.wait_for_exit(patience_of_a_drive()), 0) << testing::PrintToString(play.lines());
+  EXPECT_TRUE(status_comes([](const nlohmann::json& s) { return s["lidars"].front()["heard_ms_ago"] > 300; }));
+  EXPECT_GT(viewers.end(), 20);
+  const Replay replay({"--quiet", drive.string()});
+  const std::vector<StampedPose> expected = replay.trajectory();
+  const std::vector<HeardPose> estimates = heard(listener);
+  EXPECT_EQ(std::ranges::count_if(expected,
+                                  [&](const StampedPose& pose) {
+                                    return std::ranges::none_of(estimates, [&](const HeardPose& estimate) {
+                                      return std::chrono::abs(estimate.stamp - shift_of(play) - pose.stamp) < 2ms;
+                                    });
+                                  }),
+            0)
+      << "missing estimates of " << expected.size();
+  EXPECT_LT(worst_distance_m(expected, estimates, shift_of(play)), 0.01);
 }
 
 /// Returns the answer of the command's server.
