@@ -257,8 +257,7 @@ std::string_view health_of(const IngestReport::Source& source) {
 }
 
 std::optional<std::string> slow_imu(const MotionSource& options, const IngestReport::Source& source) {
-  constexpr Duration kTooSlow = std::chrono::milliseconds{35}; ///< less than three samples in a sweep of 100 ms
-  if (options.kind != SourceKind::imu || source.period.value_or(Duration{}) <= kTooSlow)
+  if (options.kind != SourceKind::imu || source.period.value_or(Duration{}) <= HealthMonitor::kLongestImuPeriod)
     return std::nullopt;
   return fmt::format("motion source {} has a rate of {:.0f} Hz, too low to measure the motion within a sweep; let it "
                      "publish at 100 Hz or more",

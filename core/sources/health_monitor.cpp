@@ -102,6 +102,8 @@ void HealthMonitor::advance(Stamp now) {
 }
 
 void HealthMonitor::on_feedback(LidarOpinion opinion, const RegistrationFeedback& feedback, Stamp now) {
+  if (is_too_slow())
+    return;
   for (const auto& metric : metrics_) {
     const auto reason = metric->on_feedback(opinion, feedback);
     if (!reason || state_ == State::never_received || (state_ == State::lost && reason != HealthReason::self_check))

@@ -28,10 +28,11 @@ class HealthMonitor {
  public:
   static constexpr Duration kProbation = std::chrono::seconds{1};
   static constexpr Duration kShortestTimeout = std::chrono::milliseconds{50};
-  static constexpr Duration kLongestTimeout = std::chrono::seconds{1}; ///< the paper's rate of 1 Hz
+  static constexpr Duration kLongestTimeout = std::chrono::seconds{1};         ///< the paper's rate of 1 Hz
+  static constexpr Duration kLongestImuPeriod = std::chrono::milliseconds{35}; ///< three samples in a sweep of 100 ms
 
   explicit HealthMonitor(const MotionSourceOptions& source, const MotionLimits& limits = {})
-      : metrics_(health_metrics(source, limits)) {}
+      : kind_(source.kind), metrics_(health_metrics(source, limits)) {}
 
   /// Return the instant of the measurement if the sample is accepted; nothing if it is rejected.
   std::optional<Stamp> judge(const ImuSample& sample);
@@ -54,6 +55,11 @@ class HealthMonitor {
   [[nodiscard]] Duration timeout() const;
   /// Returns the period of its samples once it is known well, from fifty of them on.
   [[nodiscard]] std::optional<Duration> period() const;
+  /// Returns whether an inertial unit samples too slowly to measure the motion within a sweep. It is healthy, but not
+  /// used for that, and not compared with lidar: between two samples a gyro knows nothing of the motion.
+  [[nodiscard]] bool is_too_slow() const {
+    return kind_ == SourceKind::imu && from_seconds(period_s_) > kLongestImuPeriod;
+  }
   /// Returns the finding about the source as a whole, in words for the user; empty if nothing is wrong.
   [[nodiscard]] std::string_view verdict() const;
   [[nodiscard]] bool trusts_accelerometer() const;
@@ -82,6 +88,7 @@ class HealthMonitor {
   void change(bool healthy, HealthReason reason, Stamp now);
   void learn_period(Duration step);
 
+  SourceKind kind_;
   std::vector<std::unique_ptr<HealthMetric>> metrics_;
   SourceClock clock_;
   State state_ = State::never_received;

@@ -6,6 +6,12 @@
 
 namespace locus {
 
+namespace {
+
+bool is_usable(const HealthMonitor& health) { return health.healthy() && !health.is_too_slow(); }
+
+} // namespace
+
 MotionSources::MotionSources(const std::vector<MotionSourceOptions>& options, Fusion fusion, const MotionLimits& limits,
                              HealthSink health_sink)
     : fusion_(fusion), health_sink_(std::move(health_sink)) {
@@ -72,7 +78,7 @@ void MotionSources::follow_health(SourceId source) {
 SourceChoice MotionSources::choose(Stamp now) const {
   const auto track_of = [this](SourceId source) -> const MotionTrack& { return sources_[index_of(source)].track; };
   return choose_sources([&](SourceId source) { return track_of(source).kind(); }, sources_.size(), fusion_,
-                        [&](SourceId source) { return health(source).healthy() && track_of(source).is_live(now); });
+                        [&](SourceId source) { return is_usable(health(source)) && track_of(source).is_live(now); });
 }
 
 std::optional<Pose> MotionSources::motion(const SourceChoice& choice, Stamp from, Stamp to) const {
@@ -105,8 +111,8 @@ SensedMotion MotionSources::sensed_in(Stamp from, Stamp to) const {
     const Stamp before = std::max(from, to - SourcePose::kMoment);
     const Pose T_before_to = track.at(before).value_or(*T_source_base).inverse() * *T_source_base;
     motion.sources[i] = {
-        true, health.healthy(), epoch, *T_source_base, se3_log(T_before_to) / to_seconds(to - before), track.late()};
-    if (health.healthy() && health.trusts_accelerometer() && !motion.specific_force) {
+        true, is_usable(health), epoch, *T_source_base, se3_log(T_before_to) / to_seconds(to - before), track.late()};
+    if (is_usable(health) && health.trusts_accelerometer() && !motion.specific_force) {
       motion.specific_force = track.specific_force(from, to);
       if (motion.specific_force)
         motion.specific_force->source = SourceId{i};

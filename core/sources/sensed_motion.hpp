@@ -33,7 +33,7 @@ struct SourceChoice {
 /// Pose of the base at the end of a sweep, measured by one motion source.
 struct SourcePose {
   bool known = false;                   ///< there is a sample inside the sweep
-  bool usable = false;                  ///< known, and the source is healthy
+  bool usable = false;                  ///< known, and the source is healthy and not too slow
   std::uint32_t epoch = 0;              ///< HealthMonitor::epoch; poses of different epochs are not comparable
   Pose T_source_base;                   ///< an inertial source gives rotation only
   Vector6 twist_base = Vector6::Zero(); ///< mean over the last kMoment of the sweep

@@ -89,6 +89,18 @@ class CaptureFolder {
     }
   }
 
+  /// Drops samples of the IMU down to a rate.
+  void keep_imu_at(int hz) const {
+    const std::vector<ImuSample> samples = MotionSamples<ImuSample>::open(drive_.folder / "imu.csv")->drain();
+    std::ofstream out = file("imu.csv");
+    Stamp next = samples.front().stamp;
+    for (const ImuSample& sample : samples)
+      if (sample.stamp >= next) {
+        out << to_line(sample);
+        next += Duration{seconds{1}} / hz;
+      }
+  }
+
   /// Sets the clock of the computer that recorded all files.
   void change_times(const std::function<Stamp(Stamp)>& change) const {
     change_packets([&](Stamp stamp, const Bytes& payload, const Send& send) { send(change(stamp), payload); });
@@ -249,6 +261,21 @@ TEST_P(FieldCases, RepeatedStampsOfAnImuAreHarmless) {
   const Replay replay = changed.replay(without_odometry());
   expect_no_worse(replay, CaptureFolder(drive()).replay(without_odometry()));
   EXPECT_EQ(replay.run().err, "");
+}
+
+/// At these rates a gyro does not measure the motion within a sweep, however right each sample is.
+TEST_P(FieldCases, SlowImuIsNotUsedAndNotBlamed) {
+  std::vector<std::string> lidar_alone = without_odometry();
+  add(lidar_alone, {"--fail", "imu:lost@0"});
+  const Replay reference = CaptureFolder(drive()).replay(lidar_alone);
+  for (const int hz : {20, 10}) {
+    const CaptureFolder changed(drive());
+    changed.keep_imu_at(hz);
+    const Replay replay = changed.replay(without_odometry());
+    expect_no_worse(replay, reference); // not the same: it tells the vertical
+    expect_said(replay, "too low to measure the motion within a sweep");
+    EXPECT_EQ(replay.run().err.find("disagree"), std::string::npos) << replay.run().err;
+  }
 }
 
 TEST_P(FieldCases, AccelerationsInGLeaveNoTrace) {

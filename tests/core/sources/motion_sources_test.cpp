@@ -89,6 +89,20 @@ TEST_F(MotionSourcesTest, SourceSlowerThanTheExtrapolationIsNotChosen) {
   EXPECT_FALSE(sources.choose(at_ms(1000)).translation);
 }
 
+TEST_F(MotionSourcesTest, ImuTooSlowForASweepIsHealthyButNotUsed) {
+  MotionSources sources({{"imu", SourceKind::imu, {}}}, Fusion::combined);
+  for (int i = 0; i < 100; ++i) {
+    const Stamp stamp = at_ms(50 * i - i % 2); // 20 Hz with jitter; it turns to and fro
+    sources.add(SourceId{0}, ImuSample{stamp, stamp, {0, i % 4 < 2 ? 1.0 : -1.0, 0}, {1e-6 * i, 0, 9.81}, {}});
+  }
+  EXPECT_TRUE(sources.health(SourceId{0}).healthy());
+  EXPECT_FALSE(sources.choose(at_ms(4960)).rotation);
+  const SensedMotion sensed = sources.sensed_in(at_ms(4800), at_ms(4900));
+  EXPECT_TRUE(sensed.sources[0].known);
+  EXPECT_FALSE(sensed.sources[0].usable);
+  EXPECT_FALSE(sensed.specific_force);
+}
+
 TEST_F(MotionSourcesTest, WithoutAnySourceNothingIsCorrected) {
   const MotionSources sources({}, Fusion::combined);
   const SourceChoice choice = sources.choose(at_ms(0));
