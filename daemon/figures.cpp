@@ -63,7 +63,7 @@ void IngestReport::read(const Ingest& ingest) {
                   .healthy = health.healthy(),
                   .last_received = health.last_received(),
                   .verdict = health.verdict(),
-                  .period = health.period(),
+                  .slow_period = health.is_too_slow() ? health.period() : std::nullopt,
                   .refusal = health.refusal().value_or(Refusal{}),
                   .longest_refusal = health.longest_refusal(),
                   .gyro_axes = health.gyro_axes()};
@@ -256,18 +256,18 @@ std::string_view health_of(const IngestReport::Source& source) {
   return source.healthy ? "healthy" : source.counters.received == 0 ? "never heard" : "lost";
 }
 
-std::optional<std::string> slow_imu(const MotionSource& options, const IngestReport::Source& source) {
-  if (options.kind != SourceKind::imu || source.period.value_or(Duration{}) <= HealthMonitor::kLongestImuPeriod)
+std::optional<std::string> slow_imu(const IngestReport::Source& source) {
+  if (!source.slow_period)
     return std::nullopt;
-  return fmt::format("motion source {} has a rate of {:.0f} Hz, too low to measure the motion within a sweep; let it "
-                     "publish at 100 Hz or more",
-                     options.name, 1.0 / to_seconds(*source.period));
+  return fmt::format("has a rate of {:.0f} Hz, too low to measure the motion within a sweep; let it publish at 100 Hz "
+                     "or more",
+                     1.0 / to_seconds(*source.slow_period));
 }
 
 std::string verdict_on(const IngestReport::Source& source, bool is_live) {
   const Refusal& refusal = is_live ? source.refusal : source.longest_refusal;
   if (!source.verdict.empty() || !refusal.is_worth_reporting())
-    return std::string{source.verdict};
+    return source.verdict.empty() ? slow_imu(source).value_or("") : std::string{source.verdict};
   return fmt::format("is rejected for {:.0f} s: it {}", to_seconds(refusal.lasted), explanation(refusal.reason));
 }
 

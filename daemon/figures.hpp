@@ -60,10 +60,10 @@ struct IngestReport {
   struct Source {
     SourceCounters counters;
     bool healthy = false;
-    Stamp last_received;              ///< HealthMonitor::last_received()
-    std::string_view verdict;         ///< text with static lifetime; see HealthMonitor
-    std::optional<Duration> period{}; ///< HealthMonitor::period()
-    Refusal refusal{};                ///< HealthMonitor::refusal(); default: none
+    Stamp last_received;                   ///< HealthMonitor::last_received()
+    std::string_view verdict;              ///< text with static lifetime; see HealthMonitor
+    std::optional<Duration> slow_period{}; ///< of an IMU for which HealthMonitor::is_too_slow() holds
+    Refusal refusal{};                     ///< HealthMonitor::refusal(); default: none
     Refusal longest_refusal{};
     std::optional<Eigen::Matrix3d> gyro_axes{}; ///< HealthMonitor::gyro_axes()
   };
@@ -223,8 +223,8 @@ std::optional<Duration> time_since(Stamp then);
 /// Returns "healthy", "lost" or "never heard".
 std::string_view health_of(const IngestReport::Source& source);
 
-/// Warns of an IMU that is too slow to tell the motion within a sweep; empty otherwise.
-std::optional<std::string> slow_imu(const MotionSource& options, const IngestReport::Source& source);
+/// Describes an IMU that is too slow to measure the motion within a sweep, following its name; empty otherwise.
+std::optional<std::string> slow_imu(const IngestReport::Source& source);
 
 /// Says what is wrong with a source as a whole, or why its samples are refused for longer than is worth telling: at
 /// present in a service, at its longest in a finished replay. Follows the name of the source; empty if all is well.

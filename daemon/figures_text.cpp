@@ -146,7 +146,8 @@ std::string incidents_text(const std::optional<Incidents::Status>& incidents) {
                      !incidents->problem.empty() ? "none: " + incidents->problem
                      : incidents->last.empty()   ? "none stored"
                                                  : incidents->last.filename().string(),
-                     incidents->suppressed > 0 ? fmt::format(", {} more within a minute", incidents->suppressed) : "");
+                     incidents->suppressed > 0 ? fmt::format(", {} more within five minutes", incidents->suppressed)
+                                               : "");
 }
 
 /// Names the source that everything else contradicted most, with the test ratio.

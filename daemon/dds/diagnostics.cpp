@@ -92,7 +92,7 @@ std::vector<Diagnostic> diagnostics(const Figures& figures, Stamp now) {
   for (std::size_t i = 0; i < figures.config.motion_sources.size(); ++i) {
     const std::string& name = figures.config.motion_sources[i].name;
     const IngestReport::Source& source = figures.ingest.sources[i];
-    std::string fault = source.healthy ? "" : verdict_on(source, figures.live.has_value());
+    std::string fault = source.healthy && !source.slow_period ? "" : verdict_on(source, figures.live.has_value());
     if (source.healthy || source.gyro_axes)
       fault += (fault.empty() ? "" : "; ") + calibration_warning(figures, i);
     all.push_back(diagnostic(source.healthy && fault.empty() ? Level::ok : Level::warning, ": source " + name,

@@ -171,8 +171,8 @@ void SessionMonitor::check_verdicts(const IngestReport& ingest) {
     if (!verdict.empty() && verdict != logged_verdicts_[i])
       log_.warn(fmt::format("motion source {} {}", sources[i].name, verdict), {{"LOCUS_SOURCE", sources[i].name}});
     logged_verdicts_[i] = verdict;
-    if (const auto slow = slow_imu(sources[i], ingest.sources[i]); slow && !slow_imus_logged_.test(i)) {
-      log_.warn(*slow, {{"LOCUS_SOURCE", sources[i].name}});
+    if (const auto slow = slow_imu(ingest.sources[i]); slow && !slow_imus_logged_.test(i)) {
+      log_.warn(fmt::format("motion source {} {}", sources[i].name, *slow), {{"LOCUS_SOURCE", sources[i].name}});
       slow_imus_logged_.set(i);
     }
   }

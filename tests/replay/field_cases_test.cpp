@@ -274,6 +274,7 @@ TEST_P(FieldCases, SlowImuIsNotUsedAndNotBlamed) {
     const Replay replay = changed.replay(without_odometry());
     expect_no_worse(replay, reference); // not the same: it tells the vertical
     expect_said(replay, "too low to measure the motion within a sweep");
+    EXPECT_NE(replay.summary()["sources"]["imu"]["verdict"].get<std::string>().find("too low"), std::string::npos);
     EXPECT_EQ(replay.run().err.find("disagree"), std::string::npos) << replay.run().err;
   }
 }

@@ -65,8 +65,8 @@ std::vector<std::string> warnings_about(const PlayedRecording& played) {
   add(cloud_warnings(played.figures));
   add(source_verdicts(played.config, played.ingest.sources()));
   for (std::size_t i = 0; i < played.config.motion_sources.size(); ++i)
-    if (const auto slow = daemon::slow_imu(played.config.motion_sources[i], played.figures.ingest.sources[i]))
-      lines.push_back(*slow);
+    if (const auto slow = daemon::slow_imu(played.figures.ingest.sources[i]))
+      lines.push_back(fmt::format("motion source {} {}", played.config.motion_sources[i].name, *slow));
   for (std::size_t i = 0; i < played.config.motion_sources.size(); ++i)
     if (const std::string doubt = daemon::calibration_warning(played.figures, i); !doubt.empty())
       lines.push_back(fmt::format("motion source {} {}", played.config.motion_sources[i].name, doubt));
