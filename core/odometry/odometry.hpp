@@ -81,8 +81,8 @@ class Odometry {
   /// Prior odds, as twice their logarithm, that a source is right in a sweep: it is wrong once in a thousand.
   static constexpr double kSourceIsRight = 13.8;
 
-  /// Changes of the yaw rate that are tried lie this far apart, and standard deviation of the rate about them. A
-  /// registration that searches all voxels around each point finds a rate from 2.4 rad/s away.
+  /// Changes of the yaw rate that are tried lie this far apart, and standard deviation of the rate about them. Larger
+  /// steps are within reach of a registration but miss more turns, by nearer minima (docs/decisions/057).
   static constexpr double kTurnStep_radps = 0.6, kTurnSigma_radps = 0.6;
 
   /// An assumption on the motion during a sweep and on the sources that measure it.

@@ -184,6 +184,25 @@ Duration shift_of(const Child& play) {
   return {};
 }
 
+void expect_each_received(const std::vector<StampedPose>& replay, const std::vector<HeardPose>& heard, Duration shift,
+                          const std::string& who) {
+  double worst_m = 0, worst_deg = 0;
+  for (const StampedPose& expected : replay) {
+    const auto found = std::ranges::min_element(
+        heard, {}, [&](const HeardPose& pose) { return std::chrono::abs(pose.stamp - shift - expected.stamp); });
+    ASSERT_NE(found, heard.end());
+    ASSERT_LT(std::chrono::abs(found->stamp - shift - expected.stamp), std::chrono::milliseconds{2})
+        << who << " missed a sweep";
+    const Pose error = expected.T_source_base.inverse() * found->T_odom_base;
+    worst_m = std::max(worst_m, error.translation.norm());
+    worst_deg = std::max(worst_deg, angle_rad(error.rotation) / kRadPerDeg);
+  }
+  EXPECT_LT(worst_m, 0.01) << who;
+  EXPECT_LT(worst_deg, 0.1) << who;
+  testing::Test::RecordProperty(who + "_worst_um", static_cast<int>(1e6 * worst_m));
+  testing::Test::RecordProperty(who + "_worst_mdeg", static_cast<int>(1e3 * worst_deg));
+}
+
 double worst_distance_m(const std::vector<StampedPose>& expected, const std::vector<HeardPose>& heard, Duration shift) {
   double worst_m = 0;
   int compared = 0;

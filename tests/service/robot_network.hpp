@@ -99,6 +99,11 @@ std::vector<HeardPose> heard(const Child& peer, const std::string& topic = "odom
 /// Returns the offset that locus-play, which has ended, has added to all stamps.
 Duration shift_of(const Child& play);
 
+/// Expects every pose of a replay to be received by `who`, equal to 1 cm and 0.1 degrees. Stamps differ because arrival
+/// jitter changes the estimated clock offset.
+void expect_each_received(const std::vector<StampedPose>& replay, const std::vector<HeardPose>& heard, Duration shift,
+                          const std::string& who);
+
 /// Returns the largest distance of the received poses, their stamps less the shift, from the expected ones.
 double worst_distance_m(const std::vector<StampedPose>& expected, const std::vector<HeardPose>& heard, Duration shift);
 
