@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "drivers/lidar_input.hpp"
+#include "drivers/packet_decoder.hpp"
 
 namespace locus {
 

@@ -25,18 +25,18 @@ IngestReport::Lidar IngestReport::Lidar::of(const LidarInput& lidar) {
   return {.packets = lidar.counters(),
           .model = lidar.model(),
           .return_mode = lidar.return_mode(),
-          .rotation_rate_rpm = lidar.rotation_rate_rpm(),
-          .source_ip = lidar.source_ip(),
-          .refused_ip = lidar.refused_ip(),
-          .other_senders = lidar.other_senders(),
-          .unknown_packets = lidar.unknown_packets(),
-          .last_received = lidar.last_received(),
+          .rotation_rate_rpm = lidar.decoder().rotation_rate_rpm(),
+          .source_ip = lidar.sender().ip(),
+          .refused_ip = lidar.sender().rejected_ip(),
+          .other_senders = lidar.sender().others(),
+          .unknown_packets = lidar.decoder().unknown_packets(),
+          .last_received = lidar.sender().last_received(),
           .unknown_last_received = lidar.unknown_last_received(),
           .pps = lidar.clock_state(),
           .pps_unused = lidar.why_pps_is_unused(),
-          .has_date = lidar.has_date(),
-          .packets_of_other_mode = lidar.ouster() != nullptr && lidar.ouster()->is_in_other_mode()
-                                       ? lidar.ouster()->packets_of_other_start()
+          .has_date = lidar.decoder().has_date(),
+          .packets_of_other_mode = lidar.decoder().ouster() != nullptr && lidar.decoder().ouster()->is_in_other_mode()
+                                       ? lidar.decoder().ouster()->packets_of_other_start()
                                        : 0};
 }
 
@@ -77,7 +77,7 @@ std::optional<std::string> shared_port(const LidarOptions& options, const Ingest
   std::vector<std::string> refused;
   std::string yaml =
       fmt::format("{{name: {}, port: {}, source_ip: {}}}", options.name, options.port, dotted(*lidar.source_ip));
-  for (const LidarInput::OtherSender& sender : lidar.other_senders) {
+  for (const OtherSender& sender : lidar.other_senders) {
     if (sender.ip == *lidar.source_ip || sender.packets * kNegligibleRatio <= lidar.packets.data)
       continue;
     refused.push_back(fmt::format("{} from {}", sender.packets, dotted(sender.ip)));
@@ -282,7 +282,7 @@ std::string problem_of(const LidarOptions& options, const IngestReport::Lidar& l
     const std::vector<std::string> doubts = cloud_doubts(options, now);
     return doubts.empty() ? "" : doubts.front();
   }
-  for (LidarInput::OtherSender& sender : now.other_senders)
+  for (OtherSender& sender : now.other_senders)
     if (lidar.last_received - sender.last_received > kMaxAge)
       sender = {};
   if (lidar.last_received - lidar.unknown_last_received > kMaxAge)

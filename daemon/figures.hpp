@@ -40,14 +40,14 @@ struct IngestReport {
     std::string_view model, return_mode; ///< from LidarInput; empty before the first valid packet
     double rotation_rate_rpm = 0.0;
     std::optional<std::uint32_t> source_ip;        ///< host byte order
-    std::optional<std::uint32_t> refused_ip;       ///< LidarInput::refused_ip()
-    LidarInput::OtherSenders other_senders;        ///< LidarInput::other_senders()
-    std::optional<UnknownPackets> unknown_packets; ///< LidarInput::unknown_packets()
-    Stamp last_received;                           ///< LidarInput::last_received()
+    std::optional<std::uint32_t> refused_ip;       ///< LidarSender::rejected_ip()
+    OtherSenders other_senders;                    ///< LidarSender::others()
+    std::optional<UnknownPackets> unknown_packets; ///< PacketDecoder::unknown_packets()
+    Stamp last_received;                           ///< LidarSender::last_received()
     Stamp unknown_last_received;                   ///< LidarInput::unknown_last_received()
     std::string_view pps = "absent";               ///< LidarInput::clock_state()
     std::string_view pps_unused{};                 ///< LidarInput::why_pps_is_unused()
-    bool has_date = false;                         ///< LidarInput::has_date()
+    bool has_date = false;                         ///< PacketDecoder::has_date()
     std::uint64_t packets_of_other_mode = 0; ///< ouster::Decoder::packets_of_other_start() where is_in_other_mode()
 
     static Lidar of(const LidarInput& lidar);

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "core/ingest/ring_segments.hpp"
-#include "drivers/velodyne/model.hpp"
+#include "drivers/packet_decoder.hpp"
 
 namespace locus::daemon {
 
@@ -41,38 +41,12 @@ std::vector<std::optional<SourceId>> imus(const Config& config) {
   return sources;
 }
 
-/// Returns the largest number of firings in a period. An OT128 in high resolution fires three quarters of its channels
-/// per column.
-std::size_t hesai_firings(hesai::Model model, Duration period) {
-  const hesai::ModelSpec& spec = hesai::spec(model);
-  std::size_t firings = 0;
-  for (std::size_t i = 0; i < spec.sequences.size(); ++i) {
-    const bool in_part = i > 0 && spec.sequence_from == hesai::SequenceFrom::operational_state;
-    const auto columns = static_cast<std::size_t>(period / spec.sequences[i].column_duration) + 1;
-    firings = std::max(firings, columns * (in_part ? spec.layout.channels * 3 / 4 : spec.layout.channels));
-  }
-  return firings;
-}
-
-/// Returns the largest number of returns in a sweep: dual return mode, an echo for every firing. Assumes the largest
-/// model while a lidar is not yet recognised; surplus memory is reserved, but never touched.
+/// Returns the largest number of returns in a sweep; surplus memory is reserved, but never touched.
 std::size_t max_returns(const Config& config) {
   const Duration period = std::max(kMaxRevolution, config.sweep.sweep_period.value_or(kMaxRevolution));
   std::size_t returns = 0;
-  for (const LidarOptions& lidar : config.lidars) {
-    if (lidar.is_ouster()) {
-      constexpr std::size_t kColumnsPerSecond = 20480; // modes 2048x10 and 1024x20
-      returns += 2 * LidarPacket::kMaxLasers * static_cast<std::size_t>(kColumnsPerSecond * to_seconds(period) + 1);
-      continue;
-    }
-    if (lidar.hesai) {
-      returns += 2 * hesai_firings(*lidar.hesai, period);
-      continue;
-    }
-    const velodyne::ModelSpec& spec = velodyne::spec(lidar.model.value_or(velodyne::Model::vls128));
-    const auto columns = static_cast<std::size_t>(period / spec.column_duration) + 1;
-    returns += 2 * columns * spec.firings().size();
-  }
+  for (const LidarOptions& lidar : config.lidars)
+    returns += most_returns(lidar, period);
   return returns;
 }
 

@@ -12,7 +12,7 @@
 #include "daemon/input.hpp"
 #include "daemon/machine_time.hpp"
 #include "drivers/clouds/cloud_decoder.hpp"
-#include "drivers/lidar_input.hpp"
+#include "drivers/lidar_router.hpp"
 
 namespace locus::daemon {
 

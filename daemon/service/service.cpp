@@ -24,7 +24,7 @@
 #include "daemon/machine_time.hpp"
 #include "daemon/service/machine.hpp"
 #include "daemon/service/run_mark.hpp"
-#include "drivers/lidar_input.hpp"
+#include "drivers/lidar_router.hpp"
 
 namespace locus::daemon {
 

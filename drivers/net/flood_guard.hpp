@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "drivers/lidar_input.hpp"
+#include "drivers/lidar_router.hpp"
 #include "drivers/net/datagram.hpp"
 #include "drivers/net/udp_socket.hpp"
 

@@ -9,7 +9,7 @@
 #include "config/config.hpp"
 #include "daemon/input.hpp"
 #include "daemon/sweep_processor.hpp"
-#include "drivers/lidar_input.hpp"
+#include "drivers/lidar_router.hpp"
 #include "drivers/velodyne/model.hpp"
 
 namespace locus::daemon {

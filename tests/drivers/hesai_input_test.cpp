@@ -60,16 +60,16 @@ TEST(HesaiInput, IsRecognisedFromItsPackets) {
   for (std::size_t i = 0; i < hesai::kModels; ++i) {
     const auto model = static_cast<Model>(i);
     LidarInput lidar = opened();
-    const PacketLengths lengths = lidar.packet_lengths();
+    const PacketLengths lengths = lidar.decoder().lengths();
     EXPECT_EQ(std::ranges::count(lengths.of_data(), HesaiTestPacket(model, 0x37).payload().size()), 1)
         << to_string(model) << ": its length is expected";
     HesaiSender sender{model};
     ASSERT_NE(sender.send(lidar, 1), nullptr) << to_string(model);
     EXPECT_EQ(lidar.model(), to_string(model));
     EXPECT_EQ(lidar.return_mode(), "dual");
-    EXPECT_DOUBLE_EQ(lidar.rotation_rate_rpm(), 600.0);
-    EXPECT_EQ(lidar.packet_lengths().count, 1U);
-    EXPECT_EQ(lidar.unknown_packets().has_value(), false);
+    EXPECT_DOUBLE_EQ(lidar.decoder().rotation_rate_rpm(), 600.0);
+    EXPECT_EQ(lidar.decoder().lengths().count, 1U);
+    EXPECT_EQ(lidar.decoder().unknown_packets().has_value(), false);
   }
 }
 
@@ -87,7 +87,7 @@ TEST(HesaiInput, WrongMakerIsCorrected) {
   HesaiTestPacket odd{Model::xt32, 0x37};
   odd.set_return_mode(0x40);
   EXPECT_EQ(other.receive({odd.payload(), kHesaiIp, 2368, 2368, Stamp{HesaiTestPacket::kTime}}), nullptr);
-  EXPECT_EQ(to_string(other.unknown_packets().value()), "a Hesai XT32 in 1 packets");
+  EXPECT_EQ(to_string(other.decoder().unknown_packets().value()), "a Hesai XT32 in 1 packets");
   const test::VelodyneTestPacket good{velodyne::Model::vlp16, velodyne::ReturnMode::strongest};
   EXPECT_NE(other.receive({good.payload(), kHesaiIp, 2368, 2368, Stamp{HesaiTestPacket::kTime}}), nullptr);
   EXPECT_EQ(other.model(), "VLP-16");
@@ -112,7 +112,7 @@ TEST(HesaiInput, VelodyneBesideItIsNamedAndDecodedOnceItIsSilent) {
   };
   EXPECT_EQ(read_after(milliseconds{500}), 0);
   EXPECT_EQ(lidar.counters()[PacketError::sender], 10U);
-  EXPECT_EQ(lidar.refused_ip(), kVelodyneIp);
+  EXPECT_EQ(lidar.sender().rejected_ip(), kVelodyneIp);
   EXPECT_GT(read_after(seconds{2}), 0);
   EXPECT_EQ(lidar.model(), "VLP-16");
 }
@@ -125,7 +125,7 @@ TEST(HesaiInput, ConfiguredModelIsEnforcedAndAnotherNamed) {
   HesaiSender sender{Model::xt32};
   EXPECT_EQ(sender.send(lidar, 1), nullptr);
   EXPECT_EQ(lidar.counters()[PacketError::model], 1U);
-  EXPECT_EQ(lidar.recognised_model(), "XT32");
+  EXPECT_EQ(lidar.decoder().recognised_model(), "XT32");
   EXPECT_FALSE(lidar.listens_to(8308)) << "it sends no position packets";
 
   LidarOptions velodyne;
@@ -133,7 +133,7 @@ TEST(HesaiInput, ConfiguredModelIsEnforcedAndAnotherNamed) {
   LidarInput other = opened(velodyne);
   EXPECT_EQ(sender.send(other, 1), nullptr);
   EXPECT_EQ(other.counters()[PacketError::model], 1U);
-  EXPECT_EQ(other.recognised_model(), "XT32");
+  EXPECT_EQ(other.decoder().recognised_model(), "XT32");
 }
 
 TEST(HesaiInput, UnsupportedModelIsNamed) {
@@ -143,7 +143,7 @@ TEST(HesaiInput, UnsupportedModelIsNamed) {
   LidarInput lidar = opened();
   EXPECT_EQ(lidar.receive({at128, kHesaiIp, 2368, 2368, Stamp{HesaiTestPacket::kTime}}), nullptr);
   EXPECT_EQ(lidar.counters()[PacketError::model], 1U);
-  EXPECT_EQ(to_string(lidar.unknown_packets().value()), "a Hesai AT128 in 1 packets");
+  EXPECT_EQ(to_string(lidar.decoder().unknown_packets().value()), "a Hesai AT128 in 1 packets");
 }
 
 /// Whatever the lidar is configured as, the maker of what comes to its port is named, with what to do.
@@ -158,14 +158,14 @@ TEST(LidarInput, PacketsOfAnotherMakerAreNamedWithTheRemedy) {
     LidarInput lidar = opened(options);
     lidar.receive({stranger, kHesaiIp, 2368, 2368, Stamp{HesaiTestPacket::kTime}});
     EXPECT_EQ(lidar.counters()[PacketError::length], 1U);
-    EXPECT_FALSE(lidar.unknown_packets());
+    EXPECT_FALSE(lidar.decoder().unknown_packets());
     lidar.receive({livox, kHesaiIp, 2368, 2368, Stamp{HesaiTestPacket::kTime}});
     EXPECT_EQ(lidar.counters()[PacketError::model], 1U);
-    EXPECT_EQ(to_string(lidar.unknown_packets().value()), "a Livox in 1 packets");
-    EXPECT_NE(remedy(*lidar.unknown_packets()).find("key topic"), std::string_view::npos);
+    EXPECT_EQ(to_string(lidar.decoder().unknown_packets().value()), "a Livox in 1 packets");
+    EXPECT_NE(remedy(*lidar.decoder().unknown_packets()).find("key topic"), std::string_view::npos);
     lidar.receive({ouster.payload(), kHesaiIp, 2368, 2368, Stamp{HesaiTestPacket::kTime}});
-    EXPECT_EQ(to_string(lidar.unknown_packets().value()), "an Ouster in 2 packets");
-    EXPECT_NE(remedy(*lidar.unknown_packets()).find("locusctl fetch"), std::string_view::npos);
+    EXPECT_EQ(to_string(lidar.decoder().unknown_packets().value()), "an Ouster in 2 packets");
+    EXPECT_NE(remedy(*lidar.decoder().unknown_packets()).find("locusctl fetch"), std::string_view::npos);
     EXPECT_EQ(lidar.unknown_last_received(), Stamp{HesaiTestPacket::kTime});
   }
 }
@@ -205,7 +205,7 @@ TEST(HesaiInput, UtcAndTaiAreTrustedAndAFreeClockFollowsArrival) {
       packet = sender.send(lidar, number);
     ASSERT_NE(packet, nullptr);
     EXPECT_EQ(lidar.clock_state(), scale);
-    EXPECT_TRUE(lidar.has_date());
+    EXPECT_TRUE(lidar.decoder().has_date());
     const Duration time = 5 * microseconds{200} - microseconds{150} + microseconds{6};
     const Duration late = packet->stamp.time_since_epoch() - HesaiTestPacket::kTime - time;
     if (std::string_view{scale} == "internal")

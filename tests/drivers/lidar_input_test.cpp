@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "drivers/lidar_input.hpp"
+#include "drivers/lidar_router.hpp"
 #include "drivers/velodyne_test_packet.hpp"
 #include "support/returns.hpp"
 
@@ -69,12 +69,12 @@ TEST(LidarInput, OtherSendersToItsPortAreCountedByAddress) {
     EXPECT_NE(lidar.receive(stream(i)), nullptr);
     EXPECT_EQ(lidar.receive(other(i)), nullptr);
   }
-  EXPECT_EQ(lidar.other_senders()[0].ip, kOtherIp);
-  EXPECT_EQ(lidar.other_senders()[0].packets, 100U);
-  EXPECT_EQ(lidar.other_senders()[1].packets, 0U);
+  EXPECT_EQ(lidar.sender().others()[0].ip, kOtherIp);
+  EXPECT_EQ(lidar.sender().others()[0].packets, 100U);
+  EXPECT_EQ(lidar.sender().others()[1].packets, 0U);
   for (std::uint32_t ip = 1; ip < 100; ++ip) // the first few of a flood suffice
     EXPECT_EQ(lidar.receive(Stream(ip)(100)), nullptr);
-  EXPECT_EQ(lidar.other_senders().back().packets, 1U);
+  EXPECT_EQ(lidar.sender().others().back().packets, 1U);
 }
 
 std::uint64_t rejected(const PacketCounters& counters) {
@@ -325,7 +325,7 @@ TEST(LidarInput, FirstSenderIsTheLidarUntilItFallsSilent) {
   EXPECT_NE(lidar.receive(stream(1)), nullptr);
   EXPECT_EQ(lidar.counters()[PacketError::sender], 1U);
   EXPECT_NE(lidar.receive(other(1000)), nullptr) << "1.3 s later: the lidar was replaced";
-  EXPECT_EQ(lidar.source_ip(), kOtherIp);
+  EXPECT_EQ(lidar.sender().ip(), kOtherIp);
 }
 
 TEST(LidarInput, TruncatedDatagramOfAnyLengthIsCountedAsSuch) {

@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "drivers/files/capture.hpp"
-#include "drivers/lidar_input.hpp"
+#include "drivers/lidar_router.hpp"
 #include "drivers/lidar_survey.hpp"
 #include "drivers/ouster_test_packet.hpp"
 #include "support/returns.hpp"
@@ -139,9 +139,9 @@ TEST_F(OusterInput, GoodPacketsComeOutStampedAtTheirFirstColumn) {
   EXPECT_EQ(lidar.counters().lost, 0U);
   EXPECT_EQ(lidar.model(), "OS1-32");
   EXPECT_EQ(lidar.return_mode(), "strongest");
-  EXPECT_NEAR(lidar.rotation_rate_rpm(), 600.0, 0.1);
+  EXPECT_NEAR(lidar.decoder().rotation_rate_rpm(), 600.0, 0.1);
   EXPECT_EQ(lidar.clock_state(), "internal");
-  EXPECT_EQ(lidar.source_ip(), kOusterIp);
+  EXPECT_EQ(lidar.sender().ip(), kOusterIp);
 }
 
 TEST_F(OusterInput, LostPacketsAreCountedAcrossTurns) {
@@ -263,7 +263,7 @@ TEST_F(OusterInput, EveryDatagramIsCounted) {
   const PacketCounters& counters = lidar.counters();
   EXPECT_EQ(counters[PacketError::length], 20U);
   EXPECT_EQ(counters[PacketError::sender], 10U);
-  EXPECT_EQ(lidar.other_senders()[0].ip, kSecondOusterIp);
+  EXPECT_EQ(lidar.sender().others()[0].ip, kSecondOusterIp);
   EXPECT_EQ(counters.received,
             std::accumulate(counters.rejected.begin(), counters.rejected.end(), counters.data + counters.position));
 }

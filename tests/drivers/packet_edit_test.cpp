@@ -23,6 +23,7 @@
 #include "drivers/packet_clock.hpp"
 #include "drivers/velodyne/decoder.hpp"
 #include "drivers/velodyne/model.hpp"
+#include "drivers/velodyne/position_packet.hpp"
 #include "drivers/velodyne_test_packet.hpp"
 #include "drivers/wire.hpp"
 #include "support/returns.hpp"

@@ -9,7 +9,7 @@
 
 #include "closed_course.hpp"
 #include "config/config_yaml.hpp"
-#include "drivers/lidar_input.hpp"
+#include "drivers/lidar_router.hpp"
 #include "looped_course.hpp"
 #include "piece.hpp"
 #include "support/child.hpp"

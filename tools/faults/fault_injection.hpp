@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "core/sources/motion_sample.hpp"
-#include "drivers/lidar_input.hpp"
+#include "drivers/lidar_router.hpp"
 #include "drivers/net/datagram.hpp"
 #include "faults/fault.hpp"
 

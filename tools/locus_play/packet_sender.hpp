@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/lidar_input.hpp"
+#include "drivers/lidar_router.hpp"
 #include "drivers/net/datagram.hpp"
 
 namespace locus::tools {

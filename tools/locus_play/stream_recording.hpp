@@ -13,7 +13,7 @@
 #include "config/config.hpp"
 #include "daemon/input.hpp"
 #include "drivers/files/capture.hpp"
-#include "drivers/lidar_input.hpp"
+#include "drivers/lidar_router.hpp"
 #include "faults/fault_injection.hpp"
 #include "locus_sim/stream_text.hpp"
 

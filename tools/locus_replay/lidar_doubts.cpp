@@ -33,7 +33,7 @@ std::string refusals(const CloudCounters& counters) {
 
 /// Names the model that the packets report, if it is unknown.
 std::string unknown_model(const LidarInput& lidar) {
-  const auto unknown = lidar.unknown_packets();
+  const auto unknown = lidar.decoder().unknown_packets();
   return unknown ? fmt::format(" ({})", to_string(*unknown)) : "";
 }
 
@@ -43,7 +43,7 @@ bool is_configured(const LidarRouter& lidars, std::uint16_t port) {
 
 /// Returns the model that the packets of a lidar report, if it differs from the configured one.
 std::optional<std::string_view> other_model(const LidarInput& lidar) {
-  const std::string_view recognised = lidar.recognised_model();
+  const std::string_view recognised = lidar.decoder().recognised_model();
   const bool is_other = !configured_model(lidar.options()).empty() && !recognised.empty() &&
                         recognised != configured_model(lidar.options());
   return is_other ? std::optional{recognised} : std::nullopt;
@@ -85,7 +85,7 @@ std::set<std::size_t> data_packet_lengths(const LidarRouter& lidars) {
   std::set<std::size_t> lengths;
   for (const LidarInput& lidar : lidars.lidars())
     if (!lidar.options().gives_clouds()) {
-      const PacketLengths of_lidar = lidar.packet_lengths();
+      const PacketLengths of_lidar = lidar.decoder().lengths();
       lengths.insert(of_lidar.of_data().begin(), of_lidar.of_data().end());
     }
   return lengths;
@@ -125,7 +125,7 @@ std::string not_heard(const LidarInput& lidar, const Recording& recording, const
   if (const std::string rejected = rejections(lidar.counters()); !rejected.empty())
     return fmt::format("{}, rejected: {}{}; check its address and model", line, rejected, unknown_model(lidar));
   for (const auto& [port, traffic] : recording.traffic()) {
-    const PacketLengths lengths = lidar.packet_lengths();
+    const PacketLengths lengths = lidar.decoder().lengths();
     const std::uint64_t packets = data_packet_sized(traffic, {lengths.of_data().begin(), lengths.of_data().end()});
     if (packets > 0 && !is_configured(lidars, port))
       return fmt::format("{}; {} packets went to port {}: if they are its own, use --set lidars.{}.port={}", line,

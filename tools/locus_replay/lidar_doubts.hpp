@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "daemon/figures.hpp"
-#include "drivers/lidar_input.hpp"
+#include "drivers/lidar_router.hpp"
 #include "locus_replay/recording.hpp"
 
 namespace locus::tools {

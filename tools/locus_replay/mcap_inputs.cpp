@@ -72,7 +72,7 @@ void McapInputs::add_datagram(const Datagram& datagram, const LidarRouter& lidar
   const std::optional<std::size_t> index = lidars.latest();
   if (!index || datagram.truncated || datagram.decoded != nullptr)
     return;
-  if (lidars.lidars()[*index].source_ip().value_or(datagram.source_ip) != datagram.source_ip)
+  if (lidars.lidars()[*index].sender().ip().value_or(datagram.source_ip) != datagram.source_ip)
     return;
   if (config_.lidars[*index].is_ouster())
     add_ouster_packet(datagram, *index);

@@ -10,7 +10,7 @@
 #include "config/config.hpp"
 #include "daemon/dds/ros_messages.hpp"
 #include "daemon/input.hpp"
-#include "drivers/lidar_input.hpp"
+#include "drivers/lidar_router.hpp"
 #include "locus_replay/mcap_messages.hpp"
 
 namespace locus::tools {

@@ -9,7 +9,7 @@
 #include "config/config_proposal.hpp"
 #include "drivers/files/capture_folder.hpp"
 #include "drivers/files/motion_files.hpp"
-#include "drivers/lidar_input.hpp"
+#include "drivers/lidar_router.hpp"
 #include "locus_replay/arguments.hpp"
 #include "locus_replay/recording.hpp"
 

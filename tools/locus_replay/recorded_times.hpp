@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "drivers/lidar_input.hpp"
 #include "drivers/lidar_options.hpp"
+#include "drivers/lidar_router.hpp"
 #include "drivers/net/datagram.hpp"
 
 namespace locus::tools {

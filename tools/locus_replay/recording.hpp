@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "daemon/input.hpp"
-#include "drivers/lidar_input.hpp"
+#include "drivers/lidar_router.hpp"
 #include "drivers/net/datagram.hpp"
 #include "drivers/other_maker.hpp"
 #include "faults/fault_injection.hpp"

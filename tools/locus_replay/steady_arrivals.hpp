@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "drivers/clouds/cloud_view.hpp"
-#include "drivers/lidar_input.hpp"
+#include "drivers/lidar_router.hpp"
 #include "drivers/net/datagram.hpp"
 #include "locus_replay/clock_follower.hpp"
 

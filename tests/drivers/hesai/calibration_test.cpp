@@ -95,7 +95,7 @@ TEST_F(HesaiCalibration, OfAnotherNumberOfLasersIsRejected) {
   options.hesai.reset();
   const auto taken = LidarInput::open(options, 0);
   ASSERT_TRUE(taken) << taken.error();
-  EXPECT_NE(taken->hesai(), nullptr) << "such a file is one of Hesai's";
+  EXPECT_NE(taken->decoder().hesai(), nullptr) << "such a file is one of Hesai's";
 }
 
 /// The design values are close to the measured ones of a unit: a wrong order of the lasers would be degrees off.

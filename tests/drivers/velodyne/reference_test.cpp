@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "drivers/files/capture.hpp"
-#include "drivers/lidar_input.hpp"
+#include "drivers/lidar_router.hpp"
 #include "drivers/reference_data.hpp"
 #include "drivers/velodyne/decoder.hpp"
 #include "drivers/wire.hpp"
