@@ -185,6 +185,24 @@ TEST_F(Discover, AccelerationsInAnotherUnitAreReported) {
   expect_lines(discover(bag_of(messages)), {"measures 1.00 in the mean, so in g and not in m/s^2"});
 }
 
+TEST_F(Discover, ImuThatIsTooSlowIsReportedAndTheLastChoice) {
+  Messages slow;
+  for (std::size_t imu = 0; const RecordedMessage& message : room_messages())
+    if (message.topic != "/imu/data" || imu++ % 10 == 0)
+      slow.push_back(message);
+  expect_lines(discover(bag_of(slow)),
+               {"topic: /imu/data  # sensor_msgs/Imu, 20 Hz (too slow to be used, 29 Hz are needed), "});
+
+  for (RecordedMessage message : room_messages())
+    if (message.topic == "/imu/data") {
+      message.topic = "/mti/imu";
+      slow.push_back(message);
+    }
+  std::ranges::stable_sort(slow, {}, &RecordedMessage::recorded);
+  expect_lines(discover(bag_of(slow)), {"topic: /mti/imu  # sensor_msgs/Imu, 200 Hz, measures",
+                                        "  #   topic: /imu/data\n", "20 messages a second are too few to be used"});
+}
+
 TEST_F(Discover, LidarsOfABagAreThoseThatAreMountedOnTheRobot) {
   write_room_drive(folder_ / "capture", seconds{3}, 2);
   Messages messages = messages_of(folder_ / "capture", kRos);

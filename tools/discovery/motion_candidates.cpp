@@ -4,16 +4,19 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 #include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "core/sources/health_monitor.hpp"
 #include "core/sources/motion_sample.hpp"
 
 namespace locus::tools {
 namespace {
 
+const double kLeastImuRate_hz = 1.0 / to_seconds(HealthMonitor::kLongestImuPeriod);
 constexpr double kGravityTolerance = 0.15; ///< relative, as of the self-check of an IMU
 
 bool is_about(double value, double expected) { return std::abs(value - expected) <= kGravityTolerance * expected; }
@@ -57,7 +60,11 @@ const Criterion& has_most_messages() {
 
 std::vector<Criterion> criteria_for_imu(const std::string& usual,
                                         const std::function<bool(const std::string&)>& is_placed) {
-  return {is_usual_topic(usual),
+  return {{[](const MotionCandidate& one) { return one.is_too_slow() ? 0.0 : 1.0; },
+           [](const MotionCandidate&, const MotionCandidate& other) {
+             return fmt::format("{:.0f} messages a second are too few to be used", other.rate_hz());
+           }},
+          is_usual_topic(usual),
           {[&is_placed](const MotionCandidate& one) { return is_placed(one.frame) ? 1.0 : 0.0; },
            [](const MotionCandidate& chosen, const MotionCandidate& other) {
              return fmt::format("/tf_static does not place its frame '{}' on the robot, but that of {}", other.frame,
@@ -159,6 +166,10 @@ double MotionCandidate::rate_hz() const {
   return lasted_s > 0 ? static_cast<double>(later) / lasted_s : 0;
 }
 
+bool MotionCandidate::is_too_slow() const {
+  return kind == SourceKind::imu && rate_hz() > 0 && rate_hz() < kLeastImuRate_hz;
+}
+
 double MotionCandidate::mean_force_mps2() const {
   return messages > 0 ? force_sum_mps2 / static_cast<double>(messages) : 0;
 }
@@ -172,7 +183,10 @@ std::string MotionCandidate::text() const {
   const std::string unit = measures_gravity()               ? "in m/s^2, as required"
                            : is_about(mean_force_mps2(), 1) ? "so in g and not in m/s^2: accelerations are not used"
                                                             : "not that of gravity: accelerations are not used";
-  return fmt::format("sensor_msgs/Imu, {:.0f} Hz, measures {:.2f} in the mean, {}", rate_hz(), mean_force_mps2(), unit);
+  const std::string too_slow =
+      is_too_slow() ? fmt::format(" (too slow to be used, {:.0f} Hz are needed)", std::ceil(kLeastImuRate_hz)) : "";
+  return fmt::format("sensor_msgs/Imu, {:.0f} Hz{}, measures {:.2f} in the mean, {}", rate_hz(), too_slow,
+                     mean_force_mps2(), unit);
 }
 
 void choose_sources(std::vector<MotionCandidate> candidates, const std::function<bool(const std::string&)>& is_placed,

@@ -35,6 +35,7 @@ struct MotionCandidate {
 
   [[nodiscard]] double rate_hz() const; ///< 0 for fewer than two messages
   [[nodiscard]] double mean_force_mps2() const;
+  [[nodiscard]] bool is_too_slow() const;      ///< of an IMU: not used at this rate, see HealthMonitor::is_too_slow()
   [[nodiscard]] bool measures_gravity() const; ///< in m/s^2, as ROS requires
   [[nodiscard]] bool moves() const { return extent_m >= kMoves_m; }
   /// Describes it for a comment: "sensor_msgs/Imu, 100 Hz, measures 9.8 m/s^2, as gravity at rest".
@@ -47,7 +48,8 @@ struct MotionCandidate {
 /// Assigns topics to the first motion source of each kind in the configuration. Of several candidates for one source it
 /// uses the first in this order, and lists the others with the reason in `reasons`:
 ///
-/// - IMU: on the usual topic; in a frame that `is_placed` on the robot; that measures gravity in m/s^2; with most
+/// - IMU: fast enough to be used; on the usual topic; in a frame that `is_placed` on the robot; that measures gravity
+/// in m/s^2; with most
 ///   messages.
 /// - odometry: that moves; not named after lidar or truth, whose errors it would repeat; on the usual topic; of the
 ///   base; with most messages.
