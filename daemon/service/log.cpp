@@ -19,12 +19,14 @@ namespace locus::daemon {
 
 namespace {
 
-/// Tells whether stderr is the stream that systemd connected to the journal; a redirected stderr gets plain text.
+/// Tells whether stderr is the stream that systemd connected to the journal; a redirected stderr gets plain text. So
+/// does one in a container that inherits the variable but not the journal, whose library then drops messages silently.
 bool stderr_is_journal() {
   const char* const stream = std::getenv("JOURNAL_STREAM"); // NOLINT(concurrency-mt-unsafe): at start-up
   struct stat status {};
   return stream != nullptr && fstat(STDERR_FILENO, &status) == 0 &&
-         fmt::format("{}:{}", status.st_dev, status.st_ino) == stream;
+         fmt::format("{}:{}", status.st_dev, status.st_ino) == stream &&
+         access("/run/systemd/journal/socket", W_OK) == 0;
 }
 
 } // namespace
