@@ -46,11 +46,11 @@ bool is_rmc(std::string_view sentence) {
          sentence.substr(kTypeAt).starts_with(kType);
 }
 
-/// Tells whether a sentence begins as one of any type, rather than at a stray $.
+/// Tells whether a sentence begins as one of any type, rather than at a stray $: $GPGGA, or $PUBX of a maker's own.
 bool is_any(std::string_view sentence) {
-  constexpr std::size_t kAddress = 6; ///< $GPGGA
+  const std::size_t address = sentence.starts_with("$P") ? 5 : 6;
   const auto is_of_address = [](char c) { return (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9'); };
-  return sentence.size() > kAddress && std::ranges::all_of(sentence.substr(1, kAddress - 1), is_of_address);
+  return sentence.size() > address && std::ranges::all_of(sentence.substr(1, address - 1), is_of_address);
 }
 
 /// Parses hhmmss or hhmmss.sss.

@@ -89,7 +89,7 @@ TEST_F(OutputFolder, PartWithoutAWholeSweepIsReportedWithAndWithoutTruth) {
        {std::vector<std::string>{}, {"--ground-truth", room_drive() / "gt.tum"}}) {
     std::vector<std::string> arguments{"--duration", "0.02"};
     arguments.insert(arguments.end(), truth.begin(), truth.end());
-    expect_error(replay(arguments), 0, {"no whole sweep", "--duration"});
+    expect_error(replay(arguments), 0, {"no whole sweep", "record for longer", "--duration"});
   }
 }
 

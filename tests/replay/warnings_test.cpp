@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Warnings about likely mistakes that used to pass silently.
 #include <algorithm>
+#include <cstddef>
+#include <cstring>
 #include <fstream>
 #include <functional>
+#include <string_view>
 
 #include <gtest/gtest.h>
 
@@ -74,6 +77,19 @@ TEST(Warnings, SourceWhoseSamplesArriveInBursts) {
 }
 
 /// A lidar whose laser is off sends its position packets alone; the advice was to record what had been recorded.
+/// Applies `change` to each packet of a capture.
+void rewrite(const std::filesystem::path& from, const std::filesystem::path& to,
+             const std::function<void(UdpAddresses&, Bytes&)>& change) {
+  auto capture = Capture::open(from);
+  auto writer = PcapWriter::open(to);
+  while (const Datagram* datagram = capture->next()) {
+    UdpAddresses addresses{.source_ip = datagram->source_ip, .destination_port = datagram->destination_port};
+    Bytes payload(datagram->payload.begin(), datagram->payload.end());
+    change(addresses, payload);
+    writer->write(datagram->receive_stamp, addresses, payload);
+  }
+}
+
 TEST(Warnings, LidarThatSendsOnlyPositionPackets) {
   const TemporaryFolder folder;
   auto capture = Capture::open(room_drive() / "lidar.pcap");
@@ -92,6 +108,19 @@ TEST(Warnings, LidarThatSendsOnlyPositionPackets) {
       << replay.run().err;
 }
 
+TEST(Warnings, LockedPpsThatIsNotUsed) {
+  constexpr std::size_t kPpsAt = 0xCA, kNmeaAt = 0xCE;
+  constexpr std::string_view kGga = "$GPGGA,220243.00,3708.5809,N,12156.8012,W,1,08,1.0,12.0,M,,M,,*5D\r\n";
+  const TemporaryFolder folder;
+  rewrite(room_drive() / "lidar.pcap", folder / "lidar.pcap", [&](UdpAddresses&, Bytes& payload) {
+    if (payload.size() != velodyne::kPositionPacketBytes)
+      return;
+    payload[kPpsAt] = std::byte{2};
+    std::memcpy(&payload[kNmeaAt], kGga.data(), kGga.size());
+  });
+  expect_warning({folder / "lidar.pcap"}, {"lidar front: its PPS is locked, but its time is not used", "no RMC"});
+}
+
 TEST(Warnings, OneOfTwoLidarsWithoutPackets) {
   const TemporaryFolder folder;
   write_room_drive(folder.path(), std::chrono::seconds{2}, 2);
@@ -100,19 +129,6 @@ TEST(Warnings, OneOfTwoLidarsWithoutPackets) {
       {"lidar rear: no valid data packet to port 3000", "packets went to port 2369", "--set lidars.rear.port=2369"});
   expect_warning({"--set", "lidars.rear.source_ip=10.0.0.9", folder.path().string()},
                  {"lidar rear: no valid data packet to port 2369 from 10.0.0.9", "rejected: sender"});
-}
-
-/// Applies `change` to each packet of a capture.
-void rewrite(const std::filesystem::path& from, const std::filesystem::path& to,
-             const std::function<void(UdpAddresses&, Bytes&)>& change) {
-  auto capture = Capture::open(from);
-  auto writer = PcapWriter::open(to);
-  while (const Datagram* datagram = capture->next()) {
-    UdpAddresses addresses{.source_ip = datagram->source_ip, .destination_port = datagram->destination_port};
-    Bytes payload(datagram->payload.begin(), datagram->payload.end());
-    change(addresses, payload);
-    writer->write(datagram->receive_stamp, addresses, payload);
-  }
 }
 
 /// Regression: the packets of the second lidar were rejected without a message.

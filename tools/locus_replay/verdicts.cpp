@@ -57,8 +57,8 @@ std::optional<std::string> why_no_result(const PlayedRecording& played) {
 std::vector<std::string> warnings_about(const PlayedRecording& played) {
   std::vector<std::string> lines;
   if (played.figures.counters.seen == 0)
-    lines.push_back(fmt::format("{}: there is lidar data but no whole sweep, which lasts 0.05 to 0.2 s; check "
-                                "--start and --duration",
+    lines.push_back(fmt::format("{}: there is lidar data but no whole sweep, which lasts 0.05 to 0.2 s; "
+                                "record for longer, or check --start and --duration",
                                 played.capture.string()));
   const auto add = [&](const std::vector<std::string>& more) { std::ranges::copy(more, std::back_inserter(lines)); };
   add(lidar_warnings(played.recording, played.ingest.lidars(), played.config.sweep));

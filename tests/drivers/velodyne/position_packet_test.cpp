@@ -109,6 +109,7 @@ TEST(PositionPacket, UnusedLockedPpsHasAReason) {
   EXPECT_EQ(why("", 1), "") << "not locked";
   EXPECT_NE(why("").find("no NMEA sentence"), std::string::npos);
   EXPECT_NE(why(with_checksum("GPGGA,220243,3708.5809,N")).find("no RMC"), std::string::npos);
+  EXPECT_NE(why(with_checksum("PUBX,04,073731.00,091202,113851.00")).find("no RMC"), std::string::npos);
   EXPECT_NE(why("$GP" + kRmcFields).find("no checksum"), std::string::npos);
   EXPECT_NE(why("$GP" + kRmcFields + "*00\r\n").find("are wrong"), std::string::npos);
   EXPECT_NE(why(with_checksum("GPRMC,,V,,,,,,,,,,N")).find("no time"), std::string::npos);
