@@ -82,19 +82,60 @@ class Uncertain : public HealthMetric {
 };
 
 /// Distinguishes a frozen unit from a robot at rest. Readings of a live inertial unit are never identical to the last
-/// bit, unless it has no noise, and then its turn rate at rest is zero.
+/// bit, unless it has no noise, and then its turn rate at rest is zero. Zeros alone are no reading of a unit that has
+/// measured forces.
 class FrozenImu : public HealthMetric {
  public:
   std::optional<HealthReason> judge(const SourceReading& reading) override {
     const ImuSample& now = *reading.imu;
-    return reason_if(last_ && last_->angular_velocity_radps == now.angular_velocity_radps &&
-                         last_->specific_force_mps2 == now.specific_force_mps2 && !now.angular_velocity_radps.isZero(0),
-                     HealthReason::frozen);
+    const bool turns = !now.angular_velocity_radps.isZero(0), has_force = !now.specific_force_mps2.isZero(0);
+    const bool repeats = last_ && last_->angular_velocity_radps == now.angular_velocity_radps &&
+                         last_->specific_force_mps2 == now.specific_force_mps2;
+    return reason_if((repeats && turns) || (measures_force_ && !turns && !has_force), HealthReason::frozen);
   }
-  void accept(const SourceReading& reading) override { last_ = *reading.imu; }
+  void accept(const SourceReading& reading) override {
+    last_ = *reading.imu;
+    measures_force_ = measures_force_ || !last_->specific_force_mps2.isZero(0);
+  }
 
  private:
   std::optional<ImuSample> last_;
+  bool measures_force_ = false;
+};
+
+/// Detects an accelerometer that repeats its reading while the gyro beside it is alive: its forces are not used until
+/// they have changed for a second. An accelerometer that is sampled less often than the gyro repeats its readings for a
+/// few samples; a robot at rest and without noise repeats those of both.
+class FrozenAccelerometer : public HealthMetric {
+ public:
+  void accept(const SourceReading& reading) override {
+    const Duration step = last_ ? reading.stamp - last_stamp_ : Duration{};
+    const bool is_alive = last_ && last_->angular_velocity_radps != reading.imu->angular_velocity_radps;
+    if (last_ && last_->specific_force_mps2 != reading.imu->specific_force_mps2)
+      repeats_for_ = Duration{};
+    else if (is_alive)
+      repeats_for_ += step;
+    changes_for_ = repeats_for_ > kLongest ? Duration{} : changes_for_ + step;
+    frozen_ = repeats_for_ > kLongest || (frozen_ && changes_for_ < kChangesFor);
+    last_ = *reading.imu;
+    last_stamp_ = reading.stamp;
+  }
+  void reset() override { last_.reset(); }
+
+  [[nodiscard]] std::string_view verdict() const override {
+    return frozen_ ? "repeats one acceleration while its turn rates change: its accelerations are not used (possible "
+                     "causes: its driver, or a simulation that sets gravity alone)"
+                   : std::string_view{};
+  }
+  [[nodiscard]] bool trusts_accelerometer() const override { return !frozen_; }
+
+ private:
+  static constexpr Duration kLongest = std::chrono::milliseconds{200}, kChangesFor = std::chrono::seconds{1};
+
+  std::optional<ImuSample> last_;
+  Stamp last_stamp_;
+  Duration repeats_for_{}, changes_for_{};
+  bool frozen_ = false;
 };
 
 /// Detects a frozen odometry. An odometry repeats its pose while the robot stands; it is frozen if it was moving fast
@@ -261,6 +302,8 @@ std::vector<std::unique_ptr<HealthMetric>> health_metrics(const MotionSourceOpti
     metrics.push_back(std::make_unique<FrozenImu>());
     metrics.push_back(
         std::make_unique<ImuSelfCheck>(source.T_base_source, source.use_acceleration)); // must get turn rates in deg/s
+    if (source.use_acceleration == UseAcceleration::automatic)
+      metrics.push_back(std::make_unique<FrozenAccelerometer>());
     metrics.push_back(std::make_unique<ImpossibleTurnRate>());
   } else {
     metrics.push_back(std::make_unique<Uncertain>());

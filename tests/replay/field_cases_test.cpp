@@ -289,6 +289,40 @@ TEST_P(FieldCases, AccelerationsInGLeaveNoTrace) {
   expect_said(replay, "as if in g");
 }
 
+/// Drivers without an accelerometer that fill in gravity.
+TEST_P(FieldCases, ConstantAccelerationsAreNotUsed) {
+  const CaptureFolder changed(drive());
+  changed.change_imu([](std::size_t, ImuSample& sample) { sample.specific_force_mps2 = {0, 0, 9.81}; });
+  for (const std::vector<std::string>& arguments : {std::vector<std::string>{}, without_odometry()}) {
+    std::vector<std::string> gyro_alone = arguments;
+    add(gyro_alone, {"--set", "motion_sources.imu.use_acceleration=off"});
+    const Replay replay = changed.replay(arguments);
+    expect_no_worse(replay, changed.replay(gyro_alone));
+    expect_said(replay, "repeats one acceleration while its turn rates change");
+  }
+}
+
+/// Drivers that go on with empty messages when their unit is gone.
+TEST_P(FieldCases, ImuThatSendsZerosIsLost) {
+  constexpr std::size_t kGone = 1000;
+  Stamp gone;
+  const CaptureFolder changed(drive());
+  changed.change_imu([&](std::size_t i, ImuSample& sample) {
+    gone = i == kGone ? sample.stamp : gone;
+    if (i >= kGone)
+      sample.angular_velocity_radps = sample.specific_force_mps2 = Eigen::Vector3d::Zero();
+  });
+  const double gone_s = to_seconds(gone - read_tum(drive().folder / "gt.tum").front().stamp);
+  for (const std::vector<std::string>& arguments : {std::vector<std::string>{}, without_odometry()}) {
+    std::vector<std::string> silent = arguments;
+    add(silent, {"--fail", "imu:lost@" + std::to_string(gone_s)});
+    const Replay replay = changed.replay(arguments);
+    expect_no_worse(replay, CaptureFolder(drive()).replay(silent));
+    expect_said(replay, "motion source imu was rejected for");
+    expect_said(replay, "repeats one reading");
+  }
+}
+
 /// The drive as a bag whose drivers fill some messages otherwise.
 class Bag {
  public:

@@ -10,7 +10,7 @@ inline RobotSetup robot_of_restarts() {
   RobotSetup robot;
   robot.lidars.front().range_noise_m = 0.02;
   robot.wheels = sim::OdometryFaults{.scale_error = 0.005};
-  robot.imu = sim::ImuFaults{.gyro_noise_radps = 0.002};
+  robot.imu = sim::ImuFaults{.gyro_noise_radps = 0.002, .accelerometer_noise_mps2 = 0.02};
   return robot;
 }
 

@@ -30,7 +30,7 @@ RobotSetup robot() {
   RobotSetup setup;
   setup.lidars.front().range_noise_m = 0.02;
   setup.wheels = sim::OdometryFaults{.scale_error = 0.005};
-  setup.imu = sim::ImuFaults{.gyro_noise_radps = 0.002};
+  setup.imu = sim::ImuFaults{.gyro_noise_radps = 0.002, .accelerometer_noise_mps2 = 0.02};
   return setup;
 }
 

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <string_view>
 #include <vector>
 
 #include "core/sources/health_monitor.hpp"
@@ -245,13 +246,25 @@ class ImuTest : public testing::Test {
   ImuTest() { run(seconds{1}, 0.5); }
 
   void run(Duration duration, double turn_rate_radps, double noise_radps = 0.003) {
+    run_with_force(duration, turn_rate_radps, noise_radps, {0, 0, 9.81}, milliseconds{5});
+  }
+  /// Sends samples at 200 Hz, with a noise of `noise_radps` in the force as well, which is sampled every
+  /// `force_period`.
+  void run_with_force(Duration duration, double turn_rate_radps, double noise_radps, const Eigen::Vector3d& force_mps2,
+                      Duration force_period) {
+    Stamp force_sampled{};
+    Eigen::Vector3d force;
     for (const Stamp end = now_ + duration; now_ < end;) {
       now_ += milliseconds{5};
       noise_radps = -noise_radps;
+      if (now_ - force_sampled >= force_period) {
+        force = force_mps2 + Eigen::Vector3d{noise_radps, 0, 0};
+        force_sampled = now_;
+      }
       monitor_.judge(ImuSample{.stamp = now_,
                                .arrival = now_,
                                .angular_velocity_radps = {0, 0, turn_rate_radps + noise_radps},
-                               .specific_force_mps2 = {0, 0, 9.81},
+                               .specific_force_mps2 = force,
                                .attitude = {}});
     }
   }
@@ -288,6 +301,44 @@ TEST_F(ImuTest, NoiselessUnitIsNotFrozenAtRest) {
   run(seconds{2}, 0.0, 0.0);
   EXPECT_TRUE(monitor_.healthy());
   EXPECT_EQ(monitor_.counters().rejected_as(HealthReason::frozen), 0U);
+}
+
+TEST_F(ImuTest, ZerosAreNoReadingOfAUnitThatMeasuresForces) {
+  run_with_force(milliseconds{60}, 0.0, 0.0, Eigen::Vector3d::Zero(), milliseconds{5});
+  const auto event = monitor_.pop_event();
+  ASSERT_TRUE(event);
+  EXPECT_EQ(event->reason, HealthReason::frozen);
+  run(seconds{2}, 0.5);
+  EXPECT_TRUE(monitor_.healthy());
+}
+
+TEST(NewImu, GyroWithoutAccelerometerMayStandStill) {
+  HealthMonitor monitor{kImu};
+  Stamp now = stamp_from_ns(1'700'000'000'000'000'000);
+  for (int sample = 0; sample < 100; ++sample, now += milliseconds{5})
+    EXPECT_TRUE(monitor.judge(ImuSample{now, now, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), {}}));
+  EXPECT_EQ(monitor.counters().rejected_as(HealthReason::frozen), 0U);
+}
+
+/// The gyro is sound, and stays in use.
+TEST_F(ImuTest, AccelerometerThatRepeatsOneForceBesideALiveGyroIsNotUsed) {
+  EXPECT_TRUE(monitor_.trusts_accelerometer());
+  run_with_force(milliseconds{300}, 0.5, 0.003, {0, 0, 9.81}, seconds{10});
+  EXPECT_FALSE(monitor_.trusts_accelerometer());
+  EXPECT_NE(monitor_.verdict().find("repeats one acceleration"), std::string_view::npos);
+  EXPECT_TRUE(monitor_.healthy());
+  run(milliseconds{900}, 0.5);
+  EXPECT_FALSE(monitor_.trusts_accelerometer()) << "on probation";
+  run(milliseconds{200}, 0.5);
+  EXPECT_TRUE(monitor_.trusts_accelerometer());
+  EXPECT_EQ(monitor_.verdict(), "");
+}
+
+/// Cameras with an inertial unit repeat its accelerations, of 63 Hz, for each reading of the gyro.
+TEST_F(ImuTest, AccelerometerThatIsSlowerThanTheGyroIsUsed) {
+  run_with_force(seconds{3}, 0.5, 0.003, {0, 0, 9.81}, milliseconds{15});
+  EXPECT_TRUE(monitor_.trusts_accelerometer());
+  EXPECT_EQ(monitor_.verdict(), "");
 }
 
 TEST_F(ImuTest, ATurnRateBeyondAnyRangeIsAJump) {
