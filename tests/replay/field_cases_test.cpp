@@ -251,6 +251,76 @@ TEST_P(FieldCases, ClocksAndFilesChangeNothing) {
   expect_lidar_clock_to_replace_times(drive());
 }
 
+/// A VLP-16 that is set to a field of view about azimuth 0: it sends the blocks in it, twelve to a packet, each packet
+/// with the time of its first block.
+class RestrictedView {
+ public:
+  explicit RestrictedView(int half_deg) : half_cdeg_(100 * half_deg) {}
+
+  void add(Stamp stamp, const Bytes& packet, const CaptureFolder::Send& send) {
+    constexpr double kBlock_us = 110.592;
+    constexpr std::uint32_t kHour_us = 3'600'000'000;
+    const auto at = [](const Bytes& bytes, std::size_t i) { return bytes.begin() + static_cast<std::ptrdiff_t>(i); };
+    for (std::size_t block = 0; block < velodyne::kBlocks; ++block) {
+      const std::size_t begin = block * velodyne::kBlockBytes;
+      const int azimuth_cdeg = read_u16(&packet[begin + 2]);
+      if (azimuth_cdeg >= half_cdeg_ && azimuth_cdeg < velodyne::kCdegPerTurn - half_cdeg_)
+        continue;
+      if (blocks_.empty())
+        first_us_ = (read_u32(&packet[velodyne::kTimeOffset]) +
+                     static_cast<std::uint32_t>(kBlock_us * static_cast<double>(block))) %
+                    kHour_us;
+      blocks_.insert(blocks_.end(), at(packet, begin), at(packet, begin + velodyne::kBlockBytes));
+      if (blocks_.size() < velodyne::kBlocks * velodyne::kBlockBytes)
+        continue;
+      blocks_.insert(blocks_.end(), at(packet, blocks_.size()), packet.end());
+      put_little_endian(&blocks_[velodyne::kTimeOffset], first_us_, 4);
+      send(stamp, blocks_);
+      blocks_.clear();
+    }
+  }
+
+ private:
+  int half_cdeg_;
+  Bytes blocks_;
+  std::uint32_t first_us_ = 0;
+};
+
+/// A lidar that is set to send some azimuths only. With half of them the error at most doubles, and a robot with wheels
+/// or legs and a gyro is always better off with such a lidar than with none.
+TEST_P(FieldCases, RestrictedViewsAreUsedAndNotLost) {
+  constexpr double kBesideSources = 1.5, kHalfAView = 2.0, kWorst_sigma = 4.0, kTolerance_m = 0.001;
+  const auto error_m = [](const Replay& replay, const char* figure) {
+    return replay.summary()["ape_m"][figure].get<double>();
+  };
+  const CaptureFolder sound(drive());
+  const Replay whole = sound.replay(), blind = sound.replay({"--fail", "all-lidars:lost@1"});
+  for (const int half_deg : {90, 45, 39}) {
+    SCOPED_TRACE(half_deg);
+    const CaptureFolder changed(drive());
+    changed.change_packets(
+        [view = RestrictedView(half_deg)](Stamp stamp, const Bytes& packet, const CaptureFolder::Send& send) mutable {
+          if (packet.size() != velodyne::kDataPacketBytes)
+            send(stamp, packet);
+          else
+            view.add(stamp, packet, send);
+        });
+    const Replay replay = changed.replay(), lidar_and_imu = changed.replay(without_odometry());
+    for (const Replay* const one : {&replay, &lidar_and_imu}) {
+      ASSERT_EQ(one->run().status, 0) << one->run().err;
+      EXPECT_EQ(one->summary()["packets"]["total"]["lost"], 0);
+      EXPECT_LE(one->summary()["covariance"]["worst_sigma"].get<double>(), kWorst_sigma);
+    }
+    for (const char* const figure : {"mean", "max"}) {
+      EXPECT_LE(error_m(replay, figure), kBesideSources * error_m(blind, figure)) << figure;
+      EXPECT_LE(error_m(lidar_and_imu, figure), error_m(blind, figure)) << figure;
+      if (half_deg == 90) {
+        EXPECT_LE(error_m(replay, figure), kHalfAView * error_m(whole, figure) + kTolerance_m) << figure;
+      }
+    }
+  }
+}
+
 /// Drivers that stamp a sample as the one before.
 TEST_P(FieldCases, RepeatedStampsOfAnImuAreHarmless) {
   const CaptureFolder changed(drive());
