@@ -13,35 +13,21 @@ namespace locus {
 
 namespace {
 
-std::string wrong_laser_count(const LidarOptions& options, std::size_t lasers) {
-  return options.calibration + ": " + std::to_string(lasers) + " lasers, but the lidar is a " +
-         std::string{configured_model(options)};
-}
-
-Expected<hesai::Decoder, std::string> hesai_decoder(const LidarOptions& options) {
-  hesai::DecoderOptions known{options.hesai, std::nullopt, options.isa};
+/// Reads the calibration file of a lidar, if one is configured. `lasers`: of the configured model. Returns the problem,
+/// if there is one.
+template <class Calibration, class Read>
+std::optional<std::string> calibrate(const LidarOptions& options, std::optional<std::size_t> lasers, const Read& read,
+                                     std::optional<Calibration>& calibration) {
   if (options.calibration.empty())
-    return hesai::Decoder{known};
-  const auto read = hesai::read_calibration(options.calibration);
-  if (!read)
-    return read.error();
-  if (options.hesai && read->laser_count != hesai::spec(*options.hesai).layout.channels)
-    return wrong_laser_count(options, read->laser_count);
-  known.calibration = *read;
-  return hesai::Decoder{known};
-}
-
-Expected<velodyne::Decoder, std::string> velodyne_decoder(const LidarOptions& options) {
-  velodyne::DecoderOptions known{options.model, std::nullopt, std::nullopt, options.isa};
-  if (options.calibration.empty())
-    return velodyne::Decoder{known};
-  const auto read = velodyne::read_calibration(options.calibration);
-  if (!read)
-    return read.error();
-  if (options.model && read->laser_count != velodyne::spec(*options.model).calibration.laser_count)
-    return wrong_laser_count(options, read->laser_count);
-  known.calibration = *read;
-  return velodyne::Decoder{known};
+    return std::nullopt;
+  const auto found = read(options.calibration);
+  if (!found)
+    return found.error();
+  if (lasers && found->laser_count != *lasers)
+    return options.calibration + ": " + std::to_string(found->laser_count) + " lasers, but the lidar is a " +
+           std::string{configured_model(options)};
+  calibration = *found;
+  return std::nullopt;
 }
 
 std::size_t columns_in(Duration period, Duration column) { return static_cast<std::size_t>(period / column) + 1; }
@@ -112,17 +98,27 @@ PacketDecoder::PacketDecoder(const LidarOptions& options, Decoder decoder)
 
 Expected<PacketDecoder::Decoder, std::string> PacketDecoder::decoder_for(const LidarOptions& options) {
   const std::string key = "lidars." + options.name + '.';
-  const auto either = [&](const auto& decoder, const char* file) {
-    return decoder ? Expected<Decoder, std::string>{Decoder{*decoder}} : key + file + ": " + decoder.error();
-  };
-  if (options.is_hesai())
-    return either(hesai_decoder(options), "calibration");
-  if (!options.is_ouster())
-    return either(velodyne_decoder(options), "calibration");
-  const auto metadata = metadata_of(options);
-  if (!metadata)
-    return key + "metadata: " + metadata.error();
-  return Decoder{ouster::Decoder{*metadata, options.isa}};
+  if (options.is_ouster()) {
+    const auto metadata = metadata_of(options);
+    if (!metadata)
+      return key + "metadata: " + metadata.error();
+    return Decoder{ouster::Decoder{*metadata, options.isa}};
+  }
+  std::optional<std::size_t> lasers;
+  if (options.is_hesai()) {
+    hesai::DecoderOptions known{options.hesai, std::nullopt, options.isa};
+    if (options.hesai)
+      lasers = hesai::spec(*options.hesai).layout.channels;
+    if (const auto problem = calibrate(options, lasers, hesai::read_calibration, known.calibration))
+      return key + "calibration: " + *problem;
+    return Decoder{hesai::Decoder{known}};
+  }
+  velodyne::DecoderOptions known{options.model, std::nullopt, std::nullopt, options.isa};
+  if (options.model)
+    lasers = velodyne::spec(*options.model).calibration.laser_count;
+  if (const auto problem = calibrate(options, lasers, velodyne::read_calibration, known.calibration))
+    return key + "calibration: " + *problem;
+  return Decoder{velodyne::Decoder{known}};
 }
 
 void PacketDecoder::switch_maker(Payload payload) {

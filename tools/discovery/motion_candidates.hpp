@@ -49,8 +49,8 @@ struct MotionCandidate {
 /// uses the first in this order, and lists the others with the reason in `reasons`:
 ///
 /// - IMU: fast enough to be used; on the usual topic; in a frame that `is_placed` on the robot; that measures gravity
-/// in m/s^2; with most
-///   messages.
+/// in
+///   m/s^2; with most messages.
 /// - odometry: that moves; not named after lidar or truth, whose errors it would repeat; on the usual topic; of the
 ///   base; with most messages.
 ///
