@@ -122,8 +122,9 @@ void Odometry::prepare_next() {
   const double fresh = map_.insert(free_space_.leave_out_moving(scan_, filter_.pose()), filter_.pose());
   const Matrix6 share = share_of_map(fresh, *keyframe_observability_);
   filter_.transfer_error_to_map(share);
-  if (rival_)
-    rival_->hypothesis.filter.transfer_error_to_map(share);
+  for (std::optional<Rival>& rival : rivals_)
+    if (rival)
+      rival->hypothesis.filter.transfer_error_to_map(share);
   if (observer_)
     observer_->transfer_error_to_map(share);
   keyframe_observability_.reset();
@@ -330,7 +331,7 @@ void Odometry::follow_epoch(SourceId source, const SourcePose& sensed) {
 void Odometry::reset_source(SourceId source) {
   last_changes_[index_of(source)].reset();
   filter_.reset_source(source);
-  rival_.reset();
+  rivals_ = {};
   if (observer_)
     observer_->reset_source(source);
   if (sources_[index_of(source)].kind == SourceKind::odometry)

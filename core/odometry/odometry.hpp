@@ -109,12 +109,16 @@ class Odometry {
     ObjectEvidence objects{}; ///< for it, of the points
 
     [[nodiscard]] double lead() const { return odds + total(objects); }
+    void relate_to(const Rival& other);
   };
 
-  /// The two likeliest hypotheses for a sweep.
+  /// The likeliest first. More than one, because the likeliest may be a slip from which nothing follows.
+  using Rivals = std::array<std::optional<Rival>, 2>;
+
+  /// The likeliest hypotheses for a sweep.
   struct Contest {
     Hypothesis best;
-    std::optional<Rival> rival;
+    Rivals rivals;
 
     void enter(Rival other);
   };
@@ -161,7 +165,8 @@ class Odometry {
   [[nodiscard]] double prior_odds(const Sweep& sweep, const Hypothesis& hypothesis) const;
   [[nodiscard]] Rival against(const Hypothesis& best, const Sweep& sweep, Hypothesis other) const;
   [[nodiscard]] bool may_slip(const Sweep& sweep, const SourceChoice& choice) const;
-  void continue_rival(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop);
+  void continue_rivals(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop);
+  void continue_rival(const Sweep& sweep, Rival& before, Contest& contest, const Gicp::StopRequested& stop);
   void consider_turns(const Sweep& sweep, Hypothesis& best, const Gicp::StopRequested& stop);
   std::optional<Registration> consider_faults(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop);
   [[nodiscard]] bool is_likelier(const Registration& at_rest, const Hypothesis& moving,
@@ -202,7 +207,7 @@ class Odometry {
   SensedSteps steps_;
   MotionFilter filter_;
   std::array<std::optional<LastChange>, kMaxSources> last_changes_; ///< empty before the first pose of a source
-  std::optional<Rival> rival_;                                      ///< its filter includes the update with lidar
+  Rivals rivals_;                                                   ///< their filters include the update with lidar
   std::optional<MotionFilter> observer_; ///< calibrates sources whose result is only reported, never used
   SweepCorrection correction_;           ///< de-skew of the current sweep
   std::vector<SurfacePoint> scan_;       ///< points of the current sweep, fully de-skewed

@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include "core/odometry/odometry.hpp"
@@ -28,9 +29,13 @@ constexpr double kAsGoodAtRest = 0.998;
 constexpr double kSlowDoubt = 4.0;
 constexpr Duration kSlowFor = std::chrono::milliseconds{500};
 
-/// Odds against a rival, as twice their logarithm, from which it is dropped, and the time for which sweeps count:
-/// errors of the map are the same for a while, so that they are no independent evidence.
-constexpr double kExcluded = 12.0, kRemembers_s = 1.0;
+/// Odds against a rival, as twice their logarithm, from which it is dropped. A lower limit would drop true ones: a
+/// sweep that is de-skewed without a gyro fits a little worse everywhere (docs/decisions/063).
+constexpr double kExcluded = 100.0;
+
+/// Time for which sweeps count: errors of the map are the same for a while, so that they are no independent evidence.
+constexpr double kRemembers_s = 1.0;
+
 /// Distance between a rival and the best hypothesis below which they are the same.
 constexpr double kAgrees_m = 0.01;
 
@@ -60,16 +65,31 @@ bool is_forward_observed(const ObservedAxes& axes) { return axes.each()[0]; }
 
 } // namespace
 
-/// Enters a hypothesis, given how likely it is against the best one.
+/// Changes the odds from those against the best hypothesis to those against `other`.
+void Odometry::Rival::relate_to(const Rival& other) {
+  odds -= other.odds;
+  std::ranges::transform(objects, other.objects, objects.begin(), std::minus{});
+}
+
+/// Enters a hypothesis, given how likely it is against the best one. The least likely rival is dropped for it.
 void Odometry::Contest::enter(Rival other) {
   if (other.lead() > 0.0) {
-    std::swap(best, other.hypothesis);
-    other.odds = -other.odds;
-    for (float& of_object : other.objects)
-      of_object = -of_object;
-    rival = std::move(other); // the former best one, however unlikely now: a takeover may be wrong
-  } else if (other.lead() > (rival ? rival->lead() : -kExcluded)) {
-    rival = std::move(other);
+    for (std::optional<Rival>& rival : rivals)
+      if (rival)
+        rival->relate_to(other);
+    Rival former{std::exchange(best, std::move(other.hypothesis))};
+    former.relate_to(other);
+    other = std::move(former); // kept, however unlikely now: a takeover may be wrong
+  } else if (other.lead() < -kExcluded) {
+    return;
+  }
+  for (std::optional<Rival>& rival : rivals) {
+    if (!rival) {
+      rival = std::move(other);
+      return;
+    }
+    if (other.lead() > rival->lead())
+      std::swap(*rival, other);
   }
 }
 
@@ -136,12 +156,19 @@ Odometry::Rival Odometry::against(const Hypothesis& best, const Sweep& sweep, Hy
   return {std::move(other), odds, objects};
 }
 
-/// Continues the rival of the last sweep with what this one adds, unless it has come to agree with the best hypothesis.
-void Odometry::continue_rival(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop) {
-  if (!rival_ || !is_forward_observed(observed_axes_) || stop())
-    return;
-  const Assumption assumption{.without = rival_->hypothesis.without | repeating_sources(sweep), .continues = true};
-  Rival rival = against(contest.best, sweep, attempt(sweep, assumption, rival_->hypothesis.filter, stop));
+/// Continues the rivals of the last sweep.
+void Odometry::continue_rivals(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop) {
+  if (is_forward_observed(observed_axes_))
+    for (std::optional<Rival>& before : rivals_)
+      if (before && !stop())
+        continue_rival(sweep, *before, contest, stop);
+  rivals_ = {};
+}
+
+/// Continues the rival `before` with what this sweep adds, unless it has come to agree with the best hypothesis.
+void Odometry::continue_rival(const Sweep& sweep, Rival& before, Contest& contest, const Gicp::StopRequested& stop) {
+  const Assumption assumption{.without = before.hypothesis.without | repeating_sources(sweep), .continues = true};
+  Rival rival = against(contest.best, sweep, attempt(sweep, assumption, before.hypothesis.filter, stop));
   const Hypothesis& other = rival.hypothesis;
   if (stop() || lidar_health_.lacks_correspondences(other.fit)) // cut short, or blind
     return;
@@ -151,11 +178,14 @@ void Odometry::continue_rival(const Sweep& sweep, Contest& contest, const Gicp::
       other.fit.overlap() < kMinInlierShare)
     return;
   const double remembered = std::exp(-std::max(0.0, steps_.elapsed_s(sweep)) / kRemembers_s); // a clock may step back
-  rival.odds += remembered * rival_->odds;
+  rival.odds += remembered * before.odds;
   for (std::size_t i = 0; i < kObjects; ++i)
-    rival.objects[i] += static_cast<float>(remembered) * rival_->objects[i];
+    rival.objects[i] += static_cast<float>(remembered) * before.objects[i];
   if (rival.lead() > 0.0) {
-    std::swap(filter_, rival_->hypothesis.filter);
+    for (std::optional<Rival>& another : rivals_)
+      if (another && &*another != &before)
+        another->relate_to(before);
+    std::swap(filter_, before.hypothesis.filter);
     if (observer_)
       observer_->set_pose(filter_.pose());
   }
@@ -280,13 +310,12 @@ Odometry::Hypothesis Odometry::dead_reckoned(const Sweep& sweep, const Hypothesi
   return all;
 }
 
-/// Returns the likeliest hypothesis for a sweep. The next one stays as the rival, until a later sweep excludes either.
+/// Returns the likeliest hypothesis for a sweep. The next ones stay as rivals, until later sweeps exclude them.
 Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopRequested& stop) {
   const std::bitset<kMaxSources> repeating = repeating_sources(sweep);
-  Contest contest{attempt(sweep, {.without = repeating}, filter_, stop), std::nullopt};
+  Contest contest{attempt(sweep, {.without = repeating}, filter_, stop), {}};
   if (sweep.points.size() >= kMinPoints)
-    continue_rival(sweep, contest, stop);
-  rival_.reset();
+    continue_rivals(sweep, contest, stop);
   Hypothesis& best = contest.best;
   gravity_.observe(filter_.pose().rotation.conjugate() * best.filter.pose().rotation, sweep);
   flat_ground_.observe(sweep.end, gravity_.up_base());
@@ -300,12 +329,13 @@ Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopReques
   if (!best.rests && !is_accepted(sweep, lidar_alone.value_or(best.fit), first))
     return first; // not accepted: dead reckoning assumes no new fault
   best.accepted = true;
-  if (contest.rival) {
-    rival_ = std::move(contest.rival);
-    auto& [rival, odds, objects] = *rival_;
-    rival.filter.update(rival.fit.T_target_source, rival.fit.twist_base, rival.fit.information);
-    rival.filter.learn();
-  }
+  rivals_ = std::move(contest.rivals);
+  for (std::optional<Rival>& rival : rivals_)
+    if (rival) {
+      Hypothesis& other = rival->hypothesis;
+      other.filter.update(other.fit.T_target_source, other.fit.twist_base, other.fit.information);
+      other.filter.learn();
+    }
   return std::move(best);
 }
 
