@@ -76,8 +76,8 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
     return begin(sweep);
   if (first_)
     find_start(sweep, stop);
+  const Pose T_odom_last = filter_.pose(); // before a rival may take over, whose pose need not be on the ground
   Hypothesis best = choose(sweep, stop);
-  const Pose T_odom_last = filter_.pose();
   filter_ = best.filter;
   OdometryEstimate estimate;
   estimate.scan_to_scan = best.scan_to_scan;
