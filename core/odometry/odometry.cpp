@@ -76,7 +76,7 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
     return begin(sweep);
   if (first_)
     find_start(sweep, stop);
-  const Pose T_odom_last = filter_.pose(); // before a rival may take over, whose pose need not be on the ground
+  const Pose T_odom_last = filter_.pose();
   Hypothesis best = choose(sweep, stop);
   filter_ = best.filter;
   OdometryEstimate estimate;
@@ -100,10 +100,15 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
     observe(sweep, best);
   stands_ = best.rests;
   correct(sweep, filter_.twist_base(), best.rests ? kAllSources : best.without);
-  if (flat_ground_.holds())
-    filter_.set_pose(flat_ground_.flatten(T_odom_last, filter_.pose(),
-                                          estimate.failed ? Matrix6::Zero().eval()
-                                                          : best.fit.information.topLeftCorner<6, 6>().eval()));
+  if (flat_ground_.holds()) {
+    const auto flatten = [&](MotionFilter& filter, const Matrix12& information) {
+      filter.set_pose(flat_ground_.flatten(T_odom_last, filter.pose(), information.topLeftCorner<6, 6>()));
+    };
+    flatten(filter_, estimate.failed ? Matrix12::Zero().eval() : best.fit.information);
+    for (std::optional<Rival>& rival : rivals_) // one that takes over is on the same ground
+      if (rival)
+        flatten(rival->hypothesis.filter, rival->hypothesis.fit.information);
+  }
   finish(sweep, estimate);
   return estimate;
 }
