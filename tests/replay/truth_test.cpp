@@ -65,6 +65,17 @@ TEST(Truth, TruthOfAnotherTimeFailsAfterTheResultsAreWritten) {
   EXPECT_GT(replay.trajectory().size(), 70U);
 }
 
+TEST(Truth, TruthOfAnotherTimeInTheFolderIsAWarning) {
+  const TemporaryFolder folder;
+  std::filesystem::copy(room_drive(), folder.path(), std::filesystem::copy_options::recursive);
+  written(folder / "gt.tum", "10 0 0 0 0 0 0 1\n11 0 0 0 0 0 0 1\n");
+  const Replay replay({folder.path().string()});
+  EXPECT_EQ(replay.run().status, 0);
+  EXPECT_NE(replay.run().err.find("warning: "), std::string::npos) << replay.run().err;
+  EXPECT_NE(replay.run().err.find("gt.tum: its poses (10.000 to 11.000 s)"), std::string::npos) << replay.run().err;
+  EXPECT_FALSE(replay.summary().contains("ape_m"));
+}
+
 TEST(Truth, MapOfAnotherPlaceIsAWarning) {
   const TemporaryFolder folder;
   const Replay replay(with("--map-truth", written(folder / "far.ply", "ply\nformat ascii 1.0\nelement vertex 2\n"

@@ -11,7 +11,8 @@
 namespace locus::tools {
 
 Truth::Truth(const Arguments& arguments, const CaptureFolder& folder, std::vector<StampedPose> recorded)
-    : trajectory_file_(arguments.ground_truth.empty() ? folder.ground_truth : arguments.ground_truth),
+    : is_named_(!arguments.ground_truth.empty()),
+      trajectory_file_(arguments.ground_truth.empty() ? folder.ground_truth : arguments.ground_truth),
       map_file_(arguments.map_truth.empty() ? folder.map_truth : arguments.map_truth),
       trajectory_(std::move(recorded)) {
   if (!trajectory_file_.empty())
@@ -52,7 +53,7 @@ Accuracy Truth::compare(std::span<const SurfacePoint> map, const std::vector<Clo
     accuracy.trajectory = trajectory_accuracy(estimates_, trajectory_);
     accuracy.consistency = consistency(estimates_, std::exchange(covariances_, {}), trajectory_);
     if (!accuracy.trajectory)
-      accuracy.problems.push_back(why_nothing_in_common());
+      (is_named_ ? accuracy.problems : accuracy.warnings).push_back(why_nothing_in_common());
   }
   if (map_) {
     ProgressBar progress(show_progress);

@@ -32,6 +32,7 @@ class Truth {
 
   /// Compares; slow with a map. `steps`: those of the clock that stamped the true poses. May be called once: it
   /// converts the true poses to steady time, and frees the covariances, 10 MB per hour of driving.
+  /// True poses of another time are a problem if the user named them, and a warning if they lie in the folder.
   [[nodiscard]] Accuracy compare(std::span<const SurfacePoint> map, const std::vector<ClockStep>& steps,
                                  bool show_progress);
 
@@ -39,6 +40,7 @@ class Truth {
   [[nodiscard]] std::optional<std::string> convert(const std::vector<ClockStep>& steps);
   [[nodiscard]] std::string why_nothing_in_common() const;
 
+  bool is_named_;                                    ///< the user named the file of the true poses
   std::filesystem::path trajectory_file_, map_file_; ///< empty: none
   std::vector<StampedPose> trajectory_;
   std::optional<PointCloudFile> map_;
