@@ -11,7 +11,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-
 #include <vector>
 
 #include "core/map/gicp_kernel.hpp"
@@ -40,6 +39,9 @@ constexpr double kBestFit = 0.3; ///< mean squared Mahalanobis distance
 /// Squared Mahalanobis distance at which a point is as likely in unmapped space as on a surface: 2 ln(L / sqrt(2 pi)),
 /// with unmapped space as long as 20 standard deviations of a surface (1 m and 5 cm).
 constexpr double kUnmapped = 4.2;
+/// Mean squared Mahalanobis distance at which points are as likely anywhere within kWidthEnd of a surface as on it:
+/// 2 ln(2 kWidthEnd / sqrt(2 pi)).
+constexpr double kAnywhere = 2.05;
 /// Odds, as twice their logarithm, that an object is where the map has it: one of twenty has moved.
 constexpr double kObjectIsStatic = 6.0;
 double honest_share(double mean_error) { return kIndependent / std::max(kBestFit, mean_error); }
@@ -292,6 +294,8 @@ double fit_of(const Registration& registration) {
   return static_cast<double>(registration.inliers) * (kMissing - registration.mean_error) +
          static_cast<double>(registration.unknown) * (kMissing - kExpected);
 }
+
+bool is_spread_evenly(const Registration& registration) { return registration.mean_error > kAnywhere; }
 
 namespace {
 

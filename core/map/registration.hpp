@@ -69,6 +69,10 @@ struct Registration {
 /// the larger score is better.
 double fit_of(const Registration& registration);
 
+/// Returns whether the points lie about their surfaces as any points would: a uniform density within reach of the
+/// surfaces is as likely as that of points measured on them.
+bool is_spread_evenly(const Registration& registration);
+
 /// Evidence of each object for one hypothesis against another: twice a log likelihood ratio. May be summed over sweeps.
 using ObjectEvidence = std::array<float, kObjects>;
 

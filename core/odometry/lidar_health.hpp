@@ -19,6 +19,14 @@ class LidarHealth {
   /// Returns whether the fit is worse than usual: the de-skew or the prior may be wrong.
   [[nodiscard]] bool is_unusual(const Registration& registration) const;
 
+  /// Returns whether the points fit by chance: worse than usual, and spread evenly about their surfaces. Either the
+  /// registration or the lidar is wrong.
+  [[nodiscard]] bool is_by_chance(const Registration& registration) const;
+
+  /// Follows a registration that was rejected because its points fit by chance, `elapsed_s` after the last sweep:
+  /// faults pass, and what lasts for seconds becomes usual.
+  void forgive(const Registration& registration, double elapsed_s);
+
  private:
   double overlap_ = 0.0, fit_ = 0.0; ///< usual values
   double learned_s_ = 0.0;

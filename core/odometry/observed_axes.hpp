@@ -20,6 +20,10 @@ class ObservedAxes {
   [[nodiscard]] const std::array<bool, 6>& each() const { return observed_; }
   [[nodiscard]] bool all() const;
 
+  /// Returns whether lidar observes the forward motion. Hypotheses on the sources differ in it most; where lidar does
+  /// not observe it, points only seem to decide, most of all those of people who walk along.
+  [[nodiscard]] bool forward() const { return observed_[0]; }
+
   /// Returns `along_base` with the weakly observed axes set to zero.
   [[nodiscard]] Vector6 part_of(Vector6 along_base) const;
 

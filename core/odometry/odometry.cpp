@@ -100,17 +100,22 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
     observe(sweep, best);
   stands_ = best.rests;
   correct(sweep, filter_.twist_base(), best.rests ? kAllSources : best.without);
-  if (flat_ground_.holds()) {
-    const auto flatten = [&](MotionFilter& filter, const Matrix12& information) {
-      filter.set_pose(flat_ground_.flatten(T_odom_last, filter.pose(), information.topLeftCorner<6, 6>()));
-    };
-    flatten(filter_, estimate.failed ? Matrix12::Zero().eval() : best.fit.information);
-    for (std::optional<Rival>& rival : rivals_) // one that takes over is on the same ground
-      if (rival)
-        flatten(rival->hypothesis.filter, rival->hypothesis.fit.information);
-  }
+  if (flat_ground_.holds())
+    flatten(T_odom_last, estimate.failed ? Matrix12::Zero().eval() : best.fit.information);
   finish(sweep, estimate);
   return estimate;
+}
+
+/// Sets the poses of all filters to flat ground: a rival that takes over is on the same ground. `information`: of the
+/// sweep, about the pose and twist of the selected filter.
+void Odometry::flatten(const Pose& T_odom_last, const Matrix12& information) {
+  const auto flatten = [&](MotionFilter& filter, const Matrix12& of_points) {
+    filter.set_pose(flat_ground_.flatten(T_odom_last, filter.pose(), of_points.topLeftCorner<6, 6>()));
+  };
+  flatten(filter_, information);
+  for (std::optional<Rival>& rival : rivals_)
+    if (rival)
+      flatten(rival->hypothesis.filter, rival->hypothesis.fit.information);
 }
 
 void Odometry::prepare_next() {

@@ -76,7 +76,8 @@ class Odometry {
   void set_flat_ground(FlatGround mode) { flat_ground_ = FlatGroundAssumption(mode); }
 
  private:
-  static constexpr std::size_t kMinPoints = 30; ///< fewer do not constrain six axes reliably
+  static constexpr std::size_t kMinPoints = 30;  ///< fewer do not constrain six axes reliably
+  static constexpr double kMinInlierShare = 0.1; ///< least overlap of an accepted registration
   static constexpr std::bitset<kMaxSources> kAllSources{(1U << kMaxSources) - 1U};
   /// Prior odds, as twice their logarithm, that a source is right in a sweep: it is wrong once in a thousand.
   static constexpr double kSourceIsRight = 13.8;
@@ -84,6 +85,7 @@ class Odometry {
   /// Changes of the yaw rate that are tried lie this far apart, and standard deviation of the rate about them. Larger
   /// steps are within reach of a registration but miss more turns, by nearer minima (docs/decisions/057).
   static constexpr double kTurnStep_radps = 0.6, kTurnSigma_radps = 0.6;
+  static constexpr double kKeepsTurning = 9.2; ///< prior odds, as twice their logarithm, that none begins or ends
 
   /// An assumption on the motion during a sweep and on the sources that measure it.
   struct Assumption {
@@ -169,6 +171,9 @@ class Odometry {
   void continue_rival(const Sweep& sweep, Rival& before, Contest& contest, const Gicp::StopRequested& stop);
   void consider_turns(const Sweep& sweep, Hypothesis& best, const Gicp::StopRequested& stop);
   std::optional<Registration> consider_faults(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop);
+  void consider_jump(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop);
+  [[nodiscard]] bool fits_by_chance(const Contest& contest) const;
+  [[nodiscard]] bool is_lidar_wrong(const Sweep& sweep, const Contest& contest) const;
   [[nodiscard]] bool is_likelier(const Registration& at_rest, const Hypothesis& moving,
                                  std::optional<double> odds_against_stuck) const;
   std::optional<Hypothesis> consider_rest(const Sweep& sweep, const Hypothesis& moving,
@@ -179,6 +184,7 @@ class Odometry {
   Hypothesis choose(const Sweep& sweep, const Gicp::StopRequested& stop);
   void apply_sources(MotionFilter& filter, const Sweep& sweep, const Hypothesis& hypothesis) const;
   void observe(const Sweep& sweep, const Hypothesis& best);
+  void flatten(const Pose& T_odom_last, const Matrix12& information);
   void store_changes(const Sweep& sweep, bool returns);
   void follow_epoch(SourceId source, const SourcePose& sensed);
   void reset_source(SourceId source);

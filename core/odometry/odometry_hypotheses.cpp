@@ -4,7 +4,6 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <functional>
 #include <utility>
 
 #include "core/odometry/odometry.hpp"
@@ -12,9 +11,6 @@
 namespace locus {
 
 namespace {
-
-/// Least overlap of an accepted registration.
-constexpr double kMinInlierShare = 0.1;
 
 /// Largest deviation from the motion sources for a registration that misses most of the usual correspondences.
 constexpr double kLoneDeviation_sigma = 3.0;
@@ -29,24 +25,16 @@ constexpr double kAsGoodAtRest = 0.998;
 constexpr double kSlowDoubt = 4.0;
 constexpr Duration kSlowFor = std::chrono::milliseconds{500};
 
-/// Odds against a rival, as twice their logarithm, from which it is dropped. A lower limit would drop true ones: a
-/// sweep that is de-skewed without a gyro fits a little worse everywhere (docs/decisions/063).
-constexpr double kExcluded = 100.0;
-
-/// Time for which sweeps count: errors of the map are the same for a while, so that they are no independent evidence.
-constexpr double kRemembers_s = 1.0;
-
-/// Distance between a rival and the best hypothesis below which they are the same.
-constexpr double kAgrees_m = 0.01;
-
 /// Acceleration that an odometry reports, above which it is worth trying whether the wheels slip. A lower one finds
 /// more slips and costs more registrations (docs/decisions/053).
 constexpr double kSlipsFrom_mps2 = 2.0;
 
-/// Prior odds, as twice their logarithm, that no turn begins or ends in a sweep; largest change of the yaw rate in a
-/// sweep that is considered, in steps: people with a lidar in their hands turn on their heel at 5 rad/s.
-constexpr double kKeepsTurning = 9.2;
+/// Largest change of the yaw rate in a sweep that is considered, in steps: people with a lidar in their hands turn on
+/// their heel at 5 rad/s.
 constexpr int kMostTurnSteps = 8;
+
+/// Time between the firings of a sweep's points below which they are of one instant.
+constexpr float kInstant_s = 0.001F;
 
 /// Standard deviation of the shift that moving objects cause in the position of a robot that stands (chosen, not
 /// measured: docs/decisions/054).
@@ -59,62 +47,13 @@ bool may_rest(const MotionFilter& prediction) {
   return (prediction.twist_base().array().abs() < kSigmas * sigma.array() + kLeast).all();
 }
 
-/// Tells whether lidar observes the forward motion. Hypotheses on the sources differ in it most; where lidar does not
-/// observe it, points only seem to decide, most of all those of people who walk along.
-bool is_forward_observed(const ObservedAxes& axes) { return axes.each()[0]; }
-
 } // namespace
-
-/// Changes the odds from those against the best hypothesis to those against `other`.
-void Odometry::Rival::relate_to(const Rival& other) {
-  odds -= other.odds;
-  std::ranges::transform(objects, other.objects, objects.begin(), std::minus{});
-}
-
-/// Enters a hypothesis, given how likely it is against the best one. The least likely rival is dropped for it.
-void Odometry::Contest::enter(Rival other) {
-  if (other.lead() > 0.0) {
-    for (std::optional<Rival>& rival : rivals)
-      if (rival)
-        rival->relate_to(other);
-    Rival former{std::exchange(best, std::move(other.hypothesis))};
-    former.relate_to(other);
-    other = std::move(former); // kept, however unlikely now: a takeover may be wrong
-  } else if (other.lead() < -kExcluded) {
-    return;
-  }
-  for (std::optional<Rival>& rival : rivals) {
-    if (!rival) {
-      rival = std::move(other);
-      return;
-    }
-    if (other.lead() > rival->lead())
-      std::swap(*rival, other);
-  }
-}
 
 Odometry::Hypothesis Odometry::attempt(const Sweep& sweep, const Assumption& assumption, const MotionFilter& last,
                                        const Gicp::StopRequested& stop) {
   Hypothesis hypothesis = assume(sweep, assumption, last);
   register_with(sweep, hypothesis, stop);
   return hypothesis;
-}
-
-/// Returns the prior odds, as twice their logarithm, that all sources in use are right when those in `without` are
-/// excluded. The accelerometer counts as a source.
-double Odometry::odds_of_sources(const Sweep& sweep, std::bitset<kMaxSources> without) const {
-  const SourceChoice choice = choose_among(sweep, without);
-  const int sources = int{choice.rotation.has_value()} +
-                      int{choice.translation.has_value() && choice.translation != choice.rotation} +
-                      int{force_of(sweep, without).has_value()};
-  return kSourceIsRight * sources;
-}
-
-/// O of eq. 13 in docs/estimator.md. Returns the prior odds of a hypothesis. A fault that continues is no less likely
-/// than none.
-double Odometry::prior_odds(const Sweep& sweep, const Hypothesis& hypothesis) const {
-  return odds_of_sources(sweep, hypothesis.continues ? repeating_sources(sweep) : hypothesis.without) -
-         (hypothesis.slips ? hypothesis.filter.odds_against_slip() : 0.0);
 }
 
 /// Returns the odometries that repeat their pose: they measure a standstill, or are stuck.
@@ -147,56 +86,11 @@ std::optional<double> Odometry::odds_against_stuck(std::bitset<kMaxSources> repe
   return odds;
 }
 
-/// Eq. 13 in docs/estimator.md. Compares a hypothesis with the best one: by the likelihood of the points, of the
-/// motion, and the prior odds.
-Odometry::Rival Odometry::against(const Hypothesis& best, const Sweep& sweep, Hypothesis other) const {
-  const double odds = best.filter.surprise(best.fit) - other.filter.surprise(other.fit) + prior_odds(sweep, other) -
-                      prior_odds(sweep, best);
-  const ObjectEvidence objects = compare(other.fit, best.fit);
-  return {std::move(other), odds, objects};
-}
-
-/// Continues the rivals of the last sweep.
-void Odometry::continue_rivals(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop) {
-  if (is_forward_observed(observed_axes_))
-    for (std::optional<Rival>& before : rivals_)
-      if (before && !stop())
-        continue_rival(sweep, *before, contest, stop);
-  rivals_ = {};
-}
-
-/// Continues the rival `before` with what this sweep adds, unless it has come to agree with the best hypothesis.
-void Odometry::continue_rival(const Sweep& sweep, Rival& before, Contest& contest, const Gicp::StopRequested& stop) {
-  const Assumption assumption{.without = before.hypothesis.without | repeating_sources(sweep), .continues = true};
-  Rival rival = against(contest.best, sweep, attempt(sweep, assumption, before.hypothesis.filter, stop));
-  const Hypothesis& other = rival.hypothesis;
-  if (stop() || lidar_health_.lacks_correspondences(other.fit)) // cut short, or blind
-    return;
-  const Vector6 apart = difference(other.fit.T_target_source, contest.best.fit.T_target_source);
-  const Matrix6 P = contest.best.filter.covariance().topLeftCorner<6, 6>();
-  if ((apart.head<3>().norm() < kAgrees_m && apart.dot(P.ldlt().solve(apart)) < 1.0) ||
-      other.fit.overlap() < kMinInlierShare)
-    return;
-  const double remembered = std::exp(-std::max(0.0, steps_.elapsed_s(sweep)) / kRemembers_s); // a clock may step back
-  rival.odds += remembered * before.odds;
-  for (std::size_t i = 0; i < kObjects; ++i)
-    rival.objects[i] += static_cast<float>(remembered) * before.objects[i];
-  if (rival.lead() > 0.0) {
-    for (std::optional<Rival>& another : rivals_)
-      if (another && &*another != &before)
-        another->relate_to(before);
-    std::swap(filter_, before.hypothesis.filter);
-    if (observer_)
-      observer_->set_pose(filter_.pose());
-  }
-  contest.enter(std::move(rival));
-}
-
 /// Tells whether the wheels may have begun to slip: the forward speed that they report differs from that of the robot
 /// in the last sweep by more than robots usually accelerate, and lidar observes the axis.
 bool Odometry::may_slip(const Sweep& sweep, const SourceChoice& choice) const {
   if (!choice.translation || sources_[index_of(*choice.translation)].kind != SourceKind::odometry ||
-      !is_forward_observed(observed_axes_))
+      !observed_axes_.forward())
     return false;
   const double change_mps = steps_.twist_base(sweep, *choice.translation)->mean[0] - filter_.twist_base()[0];
   return std::abs(change_mps) > kSlipsFrom_mps2 * steps_.elapsed_s(sweep);
@@ -220,7 +114,7 @@ std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Contes
   const auto is_suspect = [&](std::optional<SourceId> source) {
     return contradiction && source && index_of(*source) == contradiction->source;
   };
-  const bool observes_forward = is_forward_observed(observed_axes_);
+  const bool observes_forward = observed_axes_.forward();
   if (may_slip(sweep, best.choice) || (observes_forward && is_suspect(best.choice.translation)))
     try_out({.without = repeating, .slips = true});
   if (!contradiction && !is_unusual())
@@ -264,6 +158,38 @@ void Odometry::consider_turns(const Sweep& sweep, Hypothesis& best, const Gicp::
       if (comparable && fit_of(turn.fit) > fit_of(best.fit) && evidence(turn.fit, best.fit) > kKeepsTurning)
         best = std::move(turn);
     }
+}
+
+/// Searches for a turn that the only source of the rotation misses, if the points fit by chance under every hypothesis.
+/// With the rate that a jump leaves in the filter they are out of reach of their surfaces, whatever is assumed.
+void Odometry::consider_jump(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop) {
+  Assumption assumption{.without = contest.best.without};
+  if (contest.best.choice.rotation)
+    assumption.without.set(index_of(*contest.best.choice.rotation));
+  if (!registered_ || !contest.best.choice.rotation || choose_among(sweep, assumption.without).rotation ||
+      !fits_by_chance(contest) || stop())
+    return;
+  Hypothesis jump = attempt(sweep, assumption, filter_, stop);
+  consider_turns(sweep, jump, stop);
+  if (!lidar_health_.is_by_chance(jump.fit))
+    contest.enter(against(contest.best, sweep, std::move(jump)));
+}
+
+/// Tells whether the points fit by chance under each hypothesis.
+bool Odometry::fits_by_chance(const Contest& contest) const {
+  return lidar_health_.is_by_chance(contest.best.fit) &&
+         std::ranges::all_of(contest.rivals, [this](const std::optional<Rival>& rival) {
+           return !rival || lidar_health_.is_by_chance(rival->hypothesis.fit);
+         });
+}
+
+/// Tells whether lidar is wrong, because its points fit by chance whatever is assumed of the motion. Those of one
+/// instant may be right: they cannot be de-skewed.
+bool Odometry::is_lidar_wrong(const Sweep& sweep, const Contest& contest) const {
+  if (!fits_by_chance(contest))
+    return false;
+  const auto [newest, oldest] = std::ranges::minmax(sweep.points, {}, &SweepPoint::age_s);
+  return oldest.age_s - newest.age_s > kInstant_s;
 }
 
 /// Tells whether a standstill is likelier than a motion. Where sources measure the motion, the odds are those of the
@@ -324,8 +250,13 @@ Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopReques
   Hypothesis first = dead_reckoned(sweep, best);
   const std::optional<Registration> lidar_alone = consider_faults(sweep, contest, stop);
   consider_turns(sweep, best, stop);
+  consider_jump(sweep, contest, stop);
   if (auto rest = consider_rest(sweep, best, stop))
     best = *std::move(rest);
+  if (!stop() && is_lidar_wrong(sweep, contest)) { // one cut short fits badly for that reason alone
+    lidar_health_.forgive(best.fit, steps_.elapsed_s(sweep));
+    return first;
+  }
   if (!best.rests && !is_accepted(sweep, lidar_alone.value_or(best.fit), first))
     return first; // not accepted: dead reckoning assumes no new fault
   best.accepted = true;

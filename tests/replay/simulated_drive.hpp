@@ -50,4 +50,6 @@ inline std::vector<std::string> a_second_in_five(const std::string& fault, doubl
 
 inline double ape_mean_m(const Replay& replay) { return replay.summary()["ape_m"]["mean"]; }
 
+inline double without_imu_m(const SimulatedDrive& drive) { return ape_mean_m(drive.replay({"--fail", "imu:lost@0"})); }
+
 } // namespace locus::test

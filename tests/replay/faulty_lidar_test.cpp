@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::json;
 
-TEST(WrongLidar, WithOccasionalRangeOffsetsIsExcluded) {
+TEST(FaultyLidar, WithOccasionalRangeOffsetsIsExcluded) {
   const SimulatedDrive drive("tunnel", "husky", 60);
   for (const double from_s : {20.0, 20.03, 20.07}) {
     SCOPED_TRACE(from_s);
@@ -29,13 +29,29 @@ TEST(WrongLidar, WithOccasionalRangeOffsetsIsExcluded) {
 }
 
 /// A map initialised with false walls, and one that was good before the fault, must both recover after it.
-TEST(WrongLidar, WithRangeOffsetAtTheStartRestarts) {
+TEST(FaultyLidar, WithRangeOffsetAtTheStartRestarts) {
   const SimulatedDrive drive("tunnel", "husky", 60);
   for (const double from_s : {0.0, 1.3, 1.5, 2.0}) {
     SCOPED_TRACE(from_s);
     const Replay replay = drive.replay(a_second_in_five("top:jump=2", from_s, 60.0));
     EXPECT_GE(replay.summary()["sweeps"]["failed"], 60);
     EXPECT_LT(ape_mean_m(replay), 0.04);
+  }
+}
+
+/// With less to compare lidar with, it must be rejected by its own points.
+TEST(FaultyLidar, WithRangeOffsetsIsExcludedByAnySources) {
+  const SimulatedDrive drive("tunnel", "husky", 60);
+  for (const std::vector<std::string>& lost :
+       std::vector<std::vector<std::string>>{{"wio:lost@0"}, {"imu:lost@0"}, {"wio:lost@0", "imu:lost@0"}}) {
+    SCOPED_TRACE(fmt::format("{}", fmt::join(lost, " ")));
+    std::vector<std::string> faults = a_second_in_five("top:jump=2", 20.0, 50.0);
+    for (const std::string& fault : lost)
+      faults.insert(faults.end(), {"--fail", fault});
+    const Replay replay = drive.replay(faults);
+    EXPECT_GE(replay.summary()["sweeps"]["failed"], 20);
+    EXPECT_LE(replay.summary()["sweeps"]["failed"], 66);
+    EXPECT_LT(ape_mean_m(replay), 0.05);
   }
 }
 
@@ -49,7 +65,7 @@ TEST(PassingVehicle, DoesNotDragTheEstimateAlong) {
   }
 }
 
-TEST(WrongLidar, DustDoesNotDegradeTheEstimate) {
+TEST(FaultyLidar, DustDoesNotDegradeTheEstimate) {
   const SimulatedDrive drive("urban", "husky", 30, {"--dust", "0.1"});
   const Replay replay = drive.replay();
   EXPECT_EQ(replay.summary()["sweeps"]["failed"], 0);
@@ -57,7 +73,7 @@ TEST(WrongLidar, DustDoesNotDegradeTheEstimate) {
 }
 
 /// No lidar to estimate the gyro bias: wheels do.
-TEST(WrongLidar, FrozenFromItsFirstPacketLeavesWheelsAndGyro) {
+TEST(FaultyLidar, FrozenFromItsFirstPacketLeavesWheelsAndGyro) {
   const SimulatedDrive drive("urban", "husky", 60);
   const Replay replay = drive.replay({"--fail", "top:frozen@0"});
   EXPECT_EQ(replay.summary()["sweeps"]["failed"], 598);
