@@ -139,51 +139,70 @@ class FrozenAccelerometer : public HealthMetric {
 };
 
 /// Detects a frozen odometry. An odometry repeats its pose while the robot stands; it is frozen if it was moving fast
-/// at the previous sample, since no robot stops like that, or if lidar continues to observe motion.
+/// at the previous sample, since no robot stops like that, or if lidar continues to observe motion. One with dead
+/// encoders beside a live gyro repeats its position alone; it is frozen if lidar observes a translation.
 class FrozenOdometry : public HealthMetric {
  public:
   explicit FrozenOdometry(double hardest_mps2) : hardest_mps2_(hardest_mps2) {}
 
   std::optional<HealthReason> judge(const SourceReading& reading) override {
-    if (!last_ || reading.odometry->T_source_base != *last_) {
-      frozen_ = false;
-      lidar_twist_.setZero();
-      lidar_path_.setZero();
-      return std::nullopt;
-    }
-    if (reading.stamp < changed_at_) { // a clock was set back: time at rest unknown
-      changed_at_ = reading.stamp;
+    const Pose& T_source_base = reading.odometry->T_source_base;
+    if (!last_ || T_source_base.translation != last_->translation)
+      position_.restart();
+    if (!last_ || T_source_base != *last_)
+      pose_.restart();
+    else if (reading.stamp < pose_.since) { // a clock was set back: time at rest unknown
+      pose_.since = reading.stamp;
       twist_.setZero();
     }
-    frozen_ = frozen_ || cannot_stop_within(reading.stamp - changed_at_) || lidar_observes_motion();
-    return reason_if(frozen_, HealthReason::frozen);
+    const bool repeats_pose = last_ && T_source_base == *last_;
+    position_.frozen = position_.frozen || position_.lidar_translates();
+    pose_.frozen = pose_.frozen || pose_.lidar_translates() || pose_.lidar_rotates() ||
+                   (repeats_pose && cannot_stop_within(reading.stamp - pose_.since));
+    return reason_if(pose_.frozen || position_.frozen, HealthReason::frozen);
   }
 
   void accept(const SourceReading& reading) override {
     const Pose& T_source_base = reading.odometry->T_source_base;
     if (last_ && T_source_base == *last_)
       return;
-    if (last_ && reading.stamp - changed_at_ >= MotionTrack::kShortestBaseline)
-      twist_ = se3_log(last_->inverse() * T_source_base) / to_seconds(reading.stamp - changed_at_);
+    if (last_ && reading.stamp - pose_.since >= MotionTrack::kShortestBaseline)
+      twist_ = se3_log(last_->inverse() * T_source_base) / to_seconds(reading.stamp - pose_.since);
+    if (!last_ || T_source_base.translation != last_->translation)
+      position_.since = reading.stamp;
+    pose_.since = reading.stamp;
     last_ = T_source_base;
-    changed_at_ = reading.stamp;
   }
 
   std::optional<HealthReason> on_feedback(LidarOpinion, const RegistrationFeedback& feedback) override {
-    if (feedback.from < changed_at_) // outdated: it was still moving then
-      return std::nullopt;
-    lidar_twist_ = feedback.twist_base;
-    lidar_path_ += to_seconds(feedback.to - feedback.from) * feedback.twist_base;
+    pose_.add(feedback);
+    position_.add(feedback);
     return std::nullopt;
   }
 
  private:
-  /// Returns whether lidar observes motion, farther than a wrong gyro shakes a sweep or two.
-  [[nodiscard]] bool lidar_observes_motion() const {
-    constexpr double kMoves_mps = 0.2, kTurns_radps = 0.2, kFor_s = 0.3;
-    return (lidar_twist_.head<3>().norm() > kMoves_mps && lidar_path_.head<3>().norm() > kFor_s * kMoves_mps) ||
-           (lidar_twist_.tail<3>().norm() > kTurns_radps && lidar_path_.tail<3>().norm() > kFor_s * kTurns_radps);
-  }
+  /// A reading that repeats, and the motion that lidar observes meanwhile.
+  struct Repeated {
+    Stamp since; ///< its last change
+    bool frozen = false;
+    Vector6 twist = Vector6::Zero();
+    Vector6 path = Vector6::Zero(); ///< m and rad
+
+    void restart() { *this = {since}; }
+    void add(const RegistrationFeedback& feedback) {
+      if (feedback.from < since) // outdated: it was still changing then
+        return;
+      twist = feedback.twist_base;
+      path += to_seconds(feedback.to - feedback.from) * feedback.twist_base;
+    }
+    [[nodiscard]] bool lidar_translates() const { return moves(twist.head<3>(), path.head<3>()); }
+    [[nodiscard]] bool lidar_rotates() const { return moves(twist.tail<3>(), path.tail<3>()); }
+    /// Tells whether the motion is farther than a wrong gyro shakes a sweep or two.
+    static bool moves(const Eigen::Vector3d& rate, const Eigen::Vector3d& distance) {
+      constexpr double kMoves = 0.2, kFor_s = 0.3; // m/s or rad/s
+      return rate.norm() > kMoves && distance.norm() > kFor_s * kMoves;
+    }
+  };
 
   [[nodiscard]] bool cannot_stop_within(Duration duration) const {
     constexpr double kHardest_radps2 = 20.0;
@@ -193,12 +212,9 @@ class FrozenOdometry : public HealthMetric {
   }
 
   double hardest_mps2_;
-  std::optional<Pose> last_; ///< latest pose that differed from the previous one
-  Stamp changed_at_;
-  Vector6 twist_ = Vector6::Zero(); ///< before changed_at_
-  bool frozen_ = false;
-  Vector6 lidar_twist_ = Vector6::Zero();
-  Vector6 lidar_path_ = Vector6::Zero(); ///< m and rad, since the last change
+  std::optional<Pose> last_;        ///< latest accepted pose that differed from the previous one
+  Vector6 twist_ = Vector6::Zero(); ///< before it
+  Repeated pose_, position_;
 };
 
 /// Rejects a turn rate that no robot has.

@@ -108,6 +108,26 @@ TEST_F(WheelsTest, ConstantPoseAgainstLidarMotionIsFrozen) {
   expect_lost(HealthReason::frozen, kDetected);
 }
 
+/// Encoders that are dead beside a gyro that is not, in a turn on the spot at first.
+TEST_F(WheelsTest, ConstantPositionAgainstLidarMotionIsFrozen) {
+  brake_and_stand(seconds{2});
+  const double hangs_at_m = x_m_;
+  double yaw_rad = 0.0;
+  const auto turn = [&](OdometrySample& sample) {
+    sample.T_source_base.translation.x() = hangs_at_m;
+    sample.T_source_base.rotation = so3_exp({0.0, 0.0, yaw_rad += 0.01});
+  };
+  run(seconds{2}, turn);
+  EXPECT_EQ(left_out(HealthReason::frozen), 0U);
+  RegistrationFeedback moving{now_ - milliseconds{200}, now_};
+  moving.twist_base.x() = 0.5;
+  monitor_.on_feedback(LidarOpinion::none, moving, now_);
+  begin_fault();
+  run(seconds{1}, turn);
+  expect_lost(HealthReason::frozen, kDetected);
+  EXPECT_EQ(left_out(HealthReason::frozen), 50U) << "also while lidar says nothing";
+}
+
 TEST_F(WheelsTest, ShakenLidarDoesNotMakeThemFrozen) {
   brake_and_stand(seconds{2});
   for (int sweep = 0; sweep < 20; ++sweep) {
