@@ -160,15 +160,15 @@ void Odometry::consider_turns(const Sweep& sweep, Hypothesis& best, const Gicp::
     }
 }
 
-/// Searches for a turn that the only source of the rotation misses, if the points fit by chance under every hypothesis.
-/// With the rate that a jump leaves in the filter they are out of reach of their surfaces, whatever is assumed.
+/// Searches for a turn without any source of the rotation, if the points fit by chance under every hypothesis. With the
+/// pose and the rate that a jump of a gyro leaves in the filter they are out of reach of their surfaces, whatever is
+/// assumed.
 void Odometry::consider_jump(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop) {
-  Assumption assumption{.without = contest.best.without};
-  if (contest.best.choice.rotation)
-    assumption.without.set(index_of(*contest.best.choice.rotation));
-  if (!registered_ || !contest.best.choice.rotation || choose_among(sweep, assumption.without).rotation ||
-      !fits_by_chance(contest) || stop())
+  if (!registered_ || !contest.best.choice.rotation || !fits_by_chance(contest) || stop())
     return;
+  Assumption assumption{.without = contest.best.without};
+  for (auto source = contest.best.choice.rotation; source; source = choose_among(sweep, assumption.without).rotation)
+    assumption.without.set(index_of(*source));
   Hypothesis jump = attempt(sweep, assumption, filter_, stop);
   consider_turns(sweep, jump, stop);
   if (!lidar_health_.is_by_chance(jump.fit))

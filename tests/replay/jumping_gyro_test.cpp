@@ -49,6 +49,14 @@ TEST(JumpingGyro, OnLegsIsExcluded) {
   }
 }
 
+/// Legs and camera measure the rotation, too; the first sweep of a jump turns the pose out of reach of what grows here.
+TEST(JumpingGyro, OnLegsInAFieldIsExcluded) {
+  const SimulatedDrive drive("field", "spot", 30, {}, 2);
+  const Replay replay = drive.replay(a_second_in_five("imu:jump=1", 8.0, 30.0));
+  EXPECT_EQ(replay.summary()["sweeps"]["failed"], 0);
+  EXPECT_LT(ape_mean_m(replay), 0.02);
+}
+
 TEST(JumpingGyro, WithoutWheelsIsExcluded) {
   const SimulatedDrive& drive = street();
   for (const double from_s : {8.0, 8.05}) {
