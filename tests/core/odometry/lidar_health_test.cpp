@@ -57,6 +57,26 @@ TEST(LidarHealth, FitWorseByASeventhIsUnusual) {
   EXPECT_FALSE(health.is_unusual(fit(80, 1.0, kPoints / 10)));
 }
 
+TEST(LidarHealth, PointsFitByChanceIfSpreadEvenlyAndUnusual) {
+  const LidarHealth health = used_to(fit(800, 1.0));
+  EXPECT_TRUE(health.is_by_chance(fit(800, 2.3)));
+  EXPECT_FALSE(health.is_by_chance(fit(600, 2.0))) << "unusual, but on their surfaces";
+  EXPECT_FALSE(used_to(fit(800, 2.3)).is_by_chance(fit(800, 2.3))) << "as usual";
+}
+
+/// No lidar is rejected for good.
+TEST(LidarHealth, FitByChanceThatLastsFiveSecondsBecomesUsual) {
+  LidarHealth health = used_to(fit(800, 1.0));
+  const auto reject_for_s = [&](double duration_s) {
+    for (int i = 0; i < static_cast<int>(std::lround(duration_s / kPeriod_s)); ++i)
+      health.forgive(fit(800, 3.0), kPeriod_s);
+  };
+  reject_for_s(1.0);
+  EXPECT_TRUE(health.is_by_chance(fit(800, 3.0)));
+  reject_for_s(4.0);
+  EXPECT_FALSE(health.is_by_chance(fit(800, 3.0)));
+}
+
 TEST(LidarHealth, AdaptsToANewPlaceInSecondsAtAnyRate) {
   for (const double period_s : {0.2, 0.1, 0.05}) {
     LidarHealth health = used_to(fit(1000), period_s);
