@@ -272,6 +272,7 @@ Vector12 solve(const ElasticEquations& points, const Registration& at, const Mot
 
 void describe(const ElasticEquations& points, Registration& result) {
   result.inliers = points.of_pose.inliers;
+  result.planes = points.of_pose.planes;
   result.mean_error = points.of_pose.error / points.of_pose.weight;
   result.information = points.information;
 }
@@ -338,7 +339,8 @@ Registration Gicp::align(const ElasticScan& source, const SurfaceMap& target, co
     return result;
   }
   double width = wide ? kWidthStartWide : kWidthStart;
-  bool few_planes = false;
+  const bool decides = !source.shapeless;
+  bool shapeless = source.shapeless.value_or(false);
   bool can_follow = false;
   while (result.iterations < options.max_iterations && (result.iterations == 0 || !stop())) {
     const bool looks_up = result.iterations % kStepsPerLookUp == 0;
@@ -347,16 +349,16 @@ Registration Gicp::align(const ElasticScan& source, const SurfaceMap& target, co
     const LookUp look_up = wide && width > kWidthStart ? LookUp::around : can_follow ? LookUp::follow : LookUp::here;
     const ElasticEquations points =
         workers_->run({target, result.T_target_source, T_start.translation, looks_up ? look_up : LookUp::reuse,
-                       few_planes, options.max_correspondence_m, width * width},
+                       shapeless, options.max_correspondence_m, width * width},
                       result.twist_base);
     const bool is_empty = !(points.of_pose.weight > 0.0);
-    if (is_empty && (few_planes || source.points.empty()))
+    if (is_empty && (shapeless || !decides || source.points.empty()))
       break;
     if (looks_up)
       can_follow = look_up != LookUp::around;
-    if (!few_planes &&
+    if (decides && !shapeless &&
         static_cast<double>(points.of_pose.planes) < kFewPlanes * static_cast<double>(source.points.size())) {
-      few_planes = true;
+      shapeless = true;
       can_follow = false;
     }
     if (is_empty)
@@ -372,7 +374,7 @@ Registration Gicp::align(const ElasticScan& source, const SurfaceMap& target, co
   }
   workers_->sum_objects(result);
   result.unknown = workers_->unknown();
-  result.shapeless = few_planes;
+  result.shapeless = shapeless;
   if (result.iterations > 0)
     result.observability = workers_->observability(result.T_target_source.R());
   return result;

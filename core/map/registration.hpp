@@ -28,6 +28,7 @@ struct ElasticScan {
   std::span<const SurfacePoint> points{}; ///< sorted by age, so that those of a block of kGicpBlock are of similar age
   std::span<const float> age_s{};         ///< of each point; empty: all are zero
   Vector6 twist_base = Vector6::Zero();   ///< m/s and rad/s
+  std::optional<bool> shapeless{};        ///< voxels without a plane serve as correspondences; empty: if planes are few
 };
 
 /// Gaussian prior of pose and twist.
@@ -48,6 +49,7 @@ struct Registration {
   int iterations = 0;                      ///< Gauss-Newton steps
   std::size_t points = 0;                  ///< number of points of the scan
   std::size_t inliers = 0;                 ///< points with a correspondence within reach
+  std::size_t planes = 0;                  ///< inliers whose correspondence is a plane
   std::size_t unknown = 0;                 ///< points in space occupied by a surface of unknown shape
   double mean_error = 0.0;                 ///< mean squared Mahalanobis distance of the inliers
   Matrix12 information = Matrix12::Zero(); ///< of the points alone, scaled for their correlation

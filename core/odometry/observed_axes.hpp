@@ -20,8 +20,7 @@ class ObservedAxes {
   [[nodiscard]] const std::array<bool, 6>& each() const { return observed_; }
   [[nodiscard]] bool all() const;
 
-  /// Returns whether lidar observes the forward motion. Hypotheses on the sources differ in it most; where lidar does
-  /// not observe it, points only seem to decide, most of all those of people who walk along.
+  /// Returns whether lidar observes the forward motion.
   [[nodiscard]] bool forward() const { return observed_[0]; }
 
   /// Returns `along_base` with the weakly observed axes set to zero.

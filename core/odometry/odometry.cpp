@@ -37,6 +37,15 @@ Matrix6 share_of_map(double fresh, const Matrix6& observability) {
   return share * all + (1.0 - share) * unconstrained;
 }
 
+/// Tells whether voxels without a plane serve as correspondences of the next sweep, too; empty: if planes are few. A
+/// share of points with a plane about that of the registration's own decision would reverse it in every other sweep.
+std::optional<bool> shapeless_after(const Registration& fit) {
+  constexpr double kManyPlanes = 0.5;
+  if (fit.shapeless && static_cast<double>(fit.planes) <= kManyPlanes * static_cast<double>(fit.points))
+    return true;
+  return std::nullopt;
+}
+
 } // namespace
 
 Odometry::Odometry(const OdometryOptions& options, const std::vector<MotionSourceOptions>& sources, StageClock* clock)
@@ -82,6 +91,7 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
   OdometryEstimate estimate;
   estimate.scan_to_scan = best.scan_to_scan;
   estimate.scan_to_submap = best.fit;
+  shapeless_ = shapeless_after(best.fit);
   static_cast<SourceChoice&>(estimate.prior) = best.choice;
   estimate.prior.otherwise = options_.no_source_prior;
   estimate.failed = !best.accepted;
@@ -230,6 +240,14 @@ void Odometry::match_last(const Sweep& sweep, const MotionBelief& belief, Hypoth
   hypothesis.scan_to_scan.T_target_source = filter_.pose().inverse() * found.T_target_source;
 }
 
+/// Returns the points of the sweep by age. The first registration of a sweep decides for all whether voxels without a
+/// plane serve: hypotheses compare only if they fit the points to the same surfaces.
+ElasticScan Odometry::aged_scan(const Sweep& sweep, const Vector6& twist_base) {
+  ElasticScan scan = aged_.sort(sweep, scan_, twist_base);
+  scan.shapeless = shapeless_;
+  return scan;
+}
+
 /// Registers the sweep with the submap, starting from the hypothesis. A registration that does not converge goes on
 /// once more from where it stopped, with the points de-skewed for the motion found so far.
 void Odometry::register_with(const Sweep& sweep, Hypothesis& hypothesis, const Gicp::StopRequested& stop) {
@@ -255,13 +273,15 @@ void Odometry::register_with(const Sweep& sweep, Hypothesis& hypothesis, const G
       hypothesis.turn_radps != 0.0 ||
       (!hypothesis.rests && hypothesis.filter.covariance().diagonal().head<3>().maxCoeff() > kWide_m * kWide_m);
   const Pose T_start = hypothesis.fit.T_target_source;
-  hypothesis.fit = gicp_.align(aged_.sort(sweep, scan_, belief.twist_base), map_, T_start, belief, options, wide, stop);
+  hypothesis.fit = gicp_.align(aged_scan(sweep, belief.twist_base), map_, T_start, belief, options, wide, stop);
+  if (!shapeless_)
+    shapeless_ = hypothesis.fit.shapeless;
   if (hypothesis.fit.converged || stop())
     return;
   const int before = hypothesis.fit.iterations;
   correct(sweep, hypothesis.fit.twist_base, without);
-  hypothesis.fit = gicp_.align(aged_.sort(sweep, scan_, hypothesis.fit.twist_base), map_,
-                               hypothesis.fit.T_target_source, belief, options, false, stop);
+  hypothesis.fit = gicp_.align(aged_scan(sweep, hypothesis.fit.twist_base), map_, hypothesis.fit.T_target_source,
+                               belief, options, false, stop);
   hypothesis.fit.iterations += before;
 }
 

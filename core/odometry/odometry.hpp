@@ -159,6 +159,7 @@ class Odometry {
   [[nodiscard]] Hypothesis assume(const Sweep& sweep, const Assumption& assumption, const MotionFilter& last) const;
   void match_last(const Sweep& sweep, const MotionBelief& belief, Hypothesis& hypothesis,
                   const Gicp::StopRequested& stop);
+  [[nodiscard]] ElasticScan aged_scan(const Sweep& sweep, const Vector6& twist_base);
   void register_with(const Sweep& sweep, Hypothesis& hypothesis, const Gicp::StopRequested& stop);
   [[nodiscard]] static std::optional<SpecificForce> force_of(const Sweep& sweep, std::bitset<kMaxSources> without);
   [[nodiscard]] std::bitset<kMaxSources> repeating_sources(const Sweep& sweep) const;
@@ -229,6 +230,7 @@ class Odometry {
   std::optional<Matrix6> keyframe_observability_; ///< of the last sweep, if it is a keyframe that is not in the map yet
   std::optional<Beginning> beginning_;
   bool stands_ = false, registered_ = false;
+  std::optional<bool> shapeless_;    ///< ElasticScan::shapeless of the current sweep, the same for all hypotheses
   bool scan_is_next_target_ = false; ///< the last sweep is to become the target of scan-to-scan
   bool has_last_scan_ = false;       ///< scan-to-scan has a target
   Stamp slow_since_;

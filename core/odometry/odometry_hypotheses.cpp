@@ -98,8 +98,9 @@ bool Odometry::may_slip(const Sweep& sweep, const SourceChoice& choice) const {
 
 /// Compares the hypotheses that a slip begins, that one source is wrong, or all are, with the one that none is. Tries
 /// them only if a source contradicts the others or the fit is unusually bad, the slip also if wheels may slip, and none
-/// without the source of a forward motion that lidar does not observe. Returns the registration without sources if it
-/// fits better but the faults it assumes are too unlikely.
+/// without the source of a forward motion that lidar does not observe: there points only seem to decide, most of all
+/// those of people who walk along. Returns the registration without sources if it fits better but the faults it assumes
+/// are too unlikely.
 std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Contest& contest,
                                                       const Gicp::StopRequested& stop) {
   const Hypothesis& best = contest.best;
@@ -154,8 +155,7 @@ void Odometry::consider_turns(const Sweep& sweep, Hypothesis& best, const Gicp::
       if (!lidar_health_.is_unusual(best.fit) || stop())
         return;
       Hypothesis turn = attempt(sweep, {.without = best.without, .turn_radps = turn_radps}, filter_, stop);
-      const bool comparable = best.fit.shapeless || !turn.fit.shapeless; // voxels without a plane only add points
-      if (comparable && fit_of(turn.fit) > fit_of(best.fit) && evidence(turn.fit, best.fit) > kKeepsTurning)
+      if (fit_of(turn.fit) > fit_of(best.fit) && evidence(turn.fit, best.fit) > kKeepsTurning)
         best = std::move(turn);
     }
 }

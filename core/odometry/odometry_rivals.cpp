@@ -81,7 +81,8 @@ Odometry::Rival Odometry::against(const Hypothesis& best, const Sweep& sweep, Hy
   return {std::move(other), odds, objects};
 }
 
-/// Continues the rivals of the last sweep.
+/// Continues the rivals of the last sweep. They differ in the forward motion most; where lidar does not observe it,
+/// none is continued.
 void Odometry::continue_rivals(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop) {
   if (observed_axes_.forward())
     for (std::optional<Rival>& before : rivals_)

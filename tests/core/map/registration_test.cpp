@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <random>
 
 #include "core/surfaces.hpp"
@@ -110,6 +111,36 @@ TEST(Gicp, PointsOfOneSweepAreAMeasurementOfScanToScan) {
   const Pose start{Eigen::Quaterniond::Identity(), {0.1, 0.05, 0.0}};
   const Registration found = Gicp(1).align({scan}, last_scan, start, kNoPrior, kOptions, false, never);
   EXPECT_LT(found.T_target_source.translation.norm(), 0.03);
+}
+
+/// Registers a scan of a thicket, or of a room, both with a map of several sweeps.
+Registration registered(const std::vector<SurfacePoint>& scan, std::optional<bool> shapeless) {
+  SurfaceMap map(kBytes);
+  for (int i = 0; i < 3; ++i)
+    map.insert(scan, Pose{});
+  const Pose start{Eigen::Quaterniond::Identity(), {0.1, 0.05, 0.0}};
+  return Gicp(1).align({.points = scan, .shapeless = shapeless}, map, start, kNoPrior, kOptions, false, never);
+}
+
+TEST(Gicp, VoxelsWithoutAPlaneServeWherePlanesAreFew) {
+  EXPECT_TRUE(registered(scan_lines_in_a_thicket(), std::nullopt).shapeless);
+  EXPECT_FALSE(registered(test::points_on(test::furnished_room(), 3000), std::nullopt).shapeless);
+}
+
+TEST(Gicp, VoxelsWithoutAPlaneServeAsTheCallerDecides) {
+  EXPECT_TRUE(registered(test::points_on(test::furnished_room(), 3000), true).shapeless);
+  const Registration found = registered(scan_lines_in_a_thicket(), false);
+  EXPECT_FALSE(found.shapeless);
+  EXPECT_EQ(found.inliers, 0U);
+  EXPECT_EQ(found.iterations, 0);
+}
+
+TEST(Gicp, PlanesAreCounted) {
+  const Registration room = registered(test::points_on(test::furnished_room(), 3000), std::nullopt);
+  EXPECT_EQ(room.planes, room.inliers);
+  const Registration thicket = registered(scan_lines_in_a_thicket(), std::nullopt);
+  EXPECT_EQ(thicket.planes, 0U);
+  EXPECT_GT(thicket.inliers, thicket.points / 2);
 }
 
 TEST(Gicp, WideReachesHalfAMetreAndTenDegrees) {
