@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <utility>
 
 #include "core/odometry/relocation.hpp"
@@ -13,17 +12,8 @@ namespace locus {
 
 namespace {
 
-/// Standard deviation of the prior position above which correspondences are searched in all voxels around a point.
-constexpr double kWide_m = 0.3;
-
 /// Capacity for the 16 000 voxels of a large sweep that still fits the L2 cache.
 constexpr std::size_t kLastScanBytes = 2'500'000;
-
-/// Deviation of a gyro's estimated lateness from the applied one above which it is updated, and its largest value.
-constexpr double kPlainlyLate_sigma = 3.0, kPlainlyLate_s = 0.001, kMostLate_s = 0.25;
-
-/// Elapsed time, in sweep lengths, above which sweeps were dropped in between.
-constexpr double kDropped = 1.5;
 
 /// Share of eq. 15 in docs/estimator.md. Returns the fraction of the future registration target contributed by this
 /// keyframe. If a share s of its surfaces is new, 2/s - 1 sweeps are visible at a time, and a step in the mean over
@@ -157,21 +147,6 @@ SourceChoice Odometry::choose_among(const Sweep& sweep, std::bitset<kMaxSources>
                         [&](SourceId source) { return !without[index_of(source)] && steps_.is_usable(sweep, source); });
 }
 
-/// Returns the twist during the sweep minus the mean since the last processed one, as far as sources measure it. Zero
-/// unless sweeps were dropped in between.
-Vector6 Odometry::twist_offset_after_drops(const Sweep& sweep) const {
-  Vector6 difference = Vector6::Zero();
-  if (steps_.elapsed_s(sweep) < kDropped * to_seconds(sweep.end - sweep.start))
-    return difference;
-  const Vector6 during_sweep = corrected_twist(sweep);
-  const auto [rotation, translation] = choose_among(sweep, {});
-  if (translation)
-    difference.head<3>() = (during_sweep - steps_.twist_base(sweep, *translation)->mean).head<3>();
-  if (rotation)
-    difference.tail<3>() = (during_sweep - steps_.twist_base(sweep, *rotation)->mean).tail<3>();
-  return difference;
-}
-
 /// Returns the hypothesis after the update with the sources, before registration. `last`: filter after the last sweep.
 Odometry::Hypothesis Odometry::assume(const Sweep& sweep, const Assumption& assumption,
                                       const MotionFilter& last) const {
@@ -227,108 +202,10 @@ void Odometry::observe(const Sweep& sweep, const Hypothesis& best) {
     observer_->learn();
 }
 
-/// Registers the sweep with the last one, starting from the hypothesis. The result is only the starting pose for the
-/// submap, not a measurement, because the submap contains the last sweep, too.
-void Odometry::match_last(const Sweep& sweep, const MotionBelief& belief, Hypothesis& hypothesis,
-                          const Gicp::StopRequested& stop) {
-  const StageScope scope(clock_, Stage::scan_to_scan);
-  const Registration found = gicp_.align(aged_.sort(sweep, scan_, belief.twist_base), last_scan_map_,
-                                         belief.T_target_source, belief, options_.scan_to_scan, false, stop);
-  if (found.converged)
-    hypothesis.fit.T_target_source = found.T_target_source;
-  hypothesis.scan_to_scan = found;
-  hypothesis.scan_to_scan.T_target_source = filter_.pose().inverse() * found.T_target_source;
-}
-
-/// Returns the points of the sweep by age. The first registration of a sweep decides for all whether voxels without a
-/// plane serve: hypotheses compare only if they fit the points to the same surfaces.
-ElasticScan Odometry::aged_scan(const Sweep& sweep, const Vector6& twist_base) {
-  ElasticScan scan = aged_.sort(sweep, scan_, twist_base);
-  scan.shapeless = shapeless_;
-  return scan;
-}
-
-/// Registers the sweep with the submap, starting from the hypothesis. A registration that does not converge goes on
-/// once more from where it stopped, with the points de-skewed for the motion found so far.
-void Odometry::register_with(const Sweep& sweep, Hypothesis& hypothesis, const Gicp::StopRequested& stop) {
-  MotionBelief belief = hypothesis.filter.belief();
-  RegistrationOptions options = options_.scan_to_submap;
-  if (hypothesis.rests) {
-    belief.T_target_source = filter_.pose();
-    belief.twist_base.setZero();
-    belief.information = 1e12 * Matrix12::Identity();
-    options.max_iterations = 4;
-  }
-  hypothesis.fit = {};
-  hypothesis.fit.T_target_source = belief.T_target_source;
-  hypothesis.fit.twist_base = belief.twist_base;
-  const std::bitset<kMaxSources> without = hypothesis.rests ? kAllSources : hypothesis.without;
-  correct(sweep, belief.twist_base, without);
-  if (sweep.points.size() < kMinPoints)
-    return;
-  if (has_last_scan_ && !hypothesis.rests)
-    match_last(sweep, belief, hypothesis, stop);
-  const StageScope scope(clock_, Stage::scan_to_submap);
-  const bool wide =
-      hypothesis.turn_radps != 0.0 ||
-      (!hypothesis.rests && hypothesis.filter.covariance().diagonal().head<3>().maxCoeff() > kWide_m * kWide_m);
-  const Pose T_start = hypothesis.fit.T_target_source;
-  hypothesis.fit = gicp_.align(aged_scan(sweep, belief.twist_base), map_, T_start, belief, options, wide, stop);
-  if (!shapeless_)
-    shapeless_ = hypothesis.fit.shapeless;
-  if (hypothesis.fit.converged || stop())
-    return;
-  const int before = hypothesis.fit.iterations;
-  correct(sweep, hypothesis.fit.twist_base, without);
-  hypothesis.fit = gicp_.align(aged_scan(sweep, hypothesis.fit.twist_base), map_, hypothesis.fit.T_target_source,
-                               belief, options, false, stop);
-  hypothesis.fit.iterations += before;
-}
-
 /// Returns the specific force of a sweep, or none if its source is excluded.
 std::optional<SpecificForce> Odometry::force_of(const Sweep& sweep, std::bitset<kMaxSources> without) {
   const std::optional<SpecificForce>& force = sweep.motion.specific_force;
   return force && !without[index_of(force->source)] ? force : std::nullopt;
-}
-
-/// De-skews the points for a base that moved with mean twist `twist_base` since the last sweep. If sources are
-/// excluded, their motion within the sweep is removed, unless they repeat their pose: then there is none.
-void Odometry::correct(const Sweep& sweep, const Vector6& twist_base, std::bitset<kMaxSources> without) {
-  without &= ~repeating_sources(sweep);
-  move_points(sweep, without.any() ? SweepCorrection::constant(sweep, twist_base)
-                                   : SweepCorrection::all(sweep, twist_base + twist_offset_after_drops(sweep)));
-}
-
-void Odometry::move_points(const Sweep& sweep, const SweepCorrection& correction) {
-  correction_ = correction;
-  correction_.apply(sweep.points, scan_);
-}
-
-/// Reports observability and the innovations of the motion sources after an accepted registration.
-void Odometry::report(const Sweep& sweep, OdometryEstimate& estimate) {
-  const Matrix6 R = turn_both(estimate.T_odom_base.rotation);
-  estimate.observability = observed_axes_.observe(R.transpose() * estimate.scan_to_submap.observability * R);
-  if (!observed_axes_.all() && estimate.state == TrackingState::tracking)
-    estimate.state = TrackingState::degenerate;
-  if (!registered_)
-    return; // a jump back to the submap is not motion of the robot
-  for (std::size_t i = 0; i < sources_.size(); ++i)
-    if (const auto twist_base = steps_.twist_base(sweep, SourceId{i})) {
-      const Innovation innovation = filter_.innovation(SourceId{i}, *twist_base);
-      source_reports_[i].innovation = innovation;
-      source_reports_[i].test_ratio = test_ratio(innovation, steps_.elapsed_s(sweep)).value_or(0.0);
-      feedback_.opinions[i] = opinion_on(innovation, steps_.elapsed_s(sweep));
-    }
-  feedback_.twist_base = observed_axes_.part_of(filter_.twist_base());
-  feedback_.observes = observed_axes_.each();
-}
-
-/// Sets the lateness of a gyro that the ingest subtracts from its stamps. Follows the estimate only if it differs
-/// clearly.
-void Odometry::follow_lateness(const Learned& late_s, Duration& applied_lateness) {
-  if (std::abs(late_s.mean - to_seconds(applied_lateness)) >
-      std::max(kPlainlyLate_sigma * late_s.sigma, kPlainlyLate_s))
-    applied_lateness = MotionTrack::applied_lateness(std::clamp(late_s.mean, -kMostLate_s, kMostLate_s));
 }
 
 /// Stores where the robot was when each source last changed its pose. `returns`: lidar is registered again after dead
@@ -345,52 +222,6 @@ void Odometry::store_changes(const Sweep& sweep, bool returns) {
     if (!last || changed || returns)
       last = {now.T_source_base, filter_.pose().translation, filter_.covariance().topLeftCorner<3, 3>()};
   }
-}
-
-/// Resets a source that was lost and returns with a new epoch, perhaps as another device. A sweep without a sample of
-/// it is no loss: scale and bias are unchanged.
-void Odometry::follow_epoch(SourceId source, const SourcePose& sensed) {
-  std::optional<std::uint32_t>& epoch = epochs_[index_of(source)];
-  if (!sensed.known || epoch == sensed.epoch)
-    return;
-  if (epoch && !recalled_[index_of(source)])
-    reset_source(source);
-  epoch = sensed.epoch;
-}
-
-void Odometry::reset_source(SourceId source) {
-  last_changes_[index_of(source)].reset();
-  filter_.reset_source(source);
-  rivals_ = {};
-  if (observer_)
-    observer_->reset_source(source);
-  if (sources_[index_of(source)].kind == SourceKind::odometry)
-    learned_since_[index_of(source)] = Stamp{};
-}
-
-/// Reports pose, health and calibration of each source.
-void Odometry::report_sources(const Sweep& sweep, OdometryEstimate& estimate) {
-  for (std::size_t i = 0; i < sources_.size(); ++i) {
-    const SourcePose& sensed = sweep.motion.sources[i];
-    SourceReport& report = source_reports_[i];
-    follow_epoch(SourceId{i}, sensed);
-    if (sensed.usable)
-      recalled_.reset(i);
-    report.T_source_base =
-        sensed.known && sources_[i].kind == SourceKind::odometry ? std::optional{sensed.T_source_base} : std::nullopt;
-    report.doubted = !sensed.usable;
-    report.learned.reset();
-    if (!sensed.usable && !recalled_[i] && learned_since_[i] == Stamp{})
-      continue; // not used yet
-    if (sources_[i].kind == SourceKind::imu)
-      follow_lateness(filter_.learned(SourceId{i}).lateness_s(), feedback_.late[i]);
-    const bool only_reported = sources_[i].calibration == Calibration::report;
-    report.learned = (only_reported ? *observer_ : filter_).learned(SourceId{i});
-    if (learned_since_[i] == Stamp{})
-      learned_since_[i] = sweep.end;
-    report.learned->since = learned_since_[i];
-  }
-  estimate.sources = source_reports_;
 }
 
 /// Completes the estimate, decides on the keyframe, and stores the sweep as the last one.
