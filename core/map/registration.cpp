@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/map/elastic_equations.hpp"
 #include "core/map/gicp_kernel.hpp"
 
 namespace locus {
@@ -32,10 +33,6 @@ constexpr double kWidthStart = 12.0;
 constexpr double kWidthEnd = 3.5;
 constexpr double kNarrowing = 0.25;
 
-/// Scale factor of the information, because residuals of one voxel, arc or object are correlated. Smaller if the fit is
-/// worse than the surfaces' covariances predict, which differs twentyfold between scenes.
-constexpr double kIndependent = 0.06;
-constexpr double kBestFit = 0.3; ///< mean squared Mahalanobis distance
 /// Squared Mahalanobis distance at which a point is as likely in unmapped space as on a surface: 2 ln(L / sqrt(2 pi)),
 /// with unmapped space as long as 20 standard deviations of a surface (1 m and 5 cm).
 constexpr double kUnmapped = 4.2;
@@ -44,18 +41,6 @@ constexpr double kUnmapped = 4.2;
 constexpr double kAnywhere = 2.05;
 /// Odds, as twice their logarithm, that an object is where the map has it: one of twenty has moved.
 constexpr double kObjectIsStatic = 6.0;
-double honest_share(double mean_error) { return kIndependent / std::max(kBestFit, mean_error); }
-
-/// Noise floor of the normal products (2 sigma): products of as many independent errors reach it by chance. Subtracted
-/// from the reported information only (James-Stein). The solution follows it all the same: weak information from a
-/// sweep is better than none.
-constexpr double kByChance_sigma = 2.0;
-constexpr double kNothing = 1e-9; ///< least information
-
-/// Error common to all points of a sweep: of the calibration, of the angle of incidence, and of both in the map.
-/// Considered (Schmidt), not estimated. It costs little where a few surfaces face the motion, and leaves nothing along
-/// a corridor, where the information comes from a thousand slightly tilted normals.
-constexpr double kCommonError_m = 0.001;
 
 constexpr double kConvergedTranslation_m = 1e-3;
 constexpr double kConvergedRotation_rad = 1e-4;
@@ -70,70 +55,12 @@ Axes axes_of(const Normals& normals) {
   return axes;
 }
 
-constexpr double square(double x) { return x * x; }
-
 /// Returns the element of Registration::object_costs for a point, by a hash of the square metre on which it stands.
 std::size_t object_at(float x_m, float y_m) {
   const auto column = static_cast<std::uint32_t>(static_cast<std::int32_t>(std::floor(x_m)));
   const auto row = static_cast<std::uint32_t>(static_cast<std::int32_t>(std::floor(y_m)));
   return ((column * 73856093U) ^ (row * 19349663U)) % kObjects;
 }
-
-/// Applies a matrix of the pose (target axes) to the twist as well (base axes).
-Matrix12 pose_and_twist(const Matrix6& of_pose, const Matrix6& R_target_base) {
-  Matrix12 both = Matrix12::Zero();
-  both.topLeftCorner<6, 6>() = of_pose;
-  both.bottomRightCorner<6, 6>() = R_target_base.transpose() * of_pose * R_target_base;
-  return both;
-}
-
-/// Normal equations of pose and twist.
-struct ElasticEquations {
-  Matrix12 H = Matrix12::Zero(); ///< after complete(): of the equations to be solved, not symmetric
-  Matrix12 information;
-  Vector12 b = Vector12::Zero();
-  NormalEquations of_pose;
-
-  /// Eq. 9 in docs/estimator.md. Adds the equations of a block of points that are `age_s` old.
-  void add(const NormalEquations& block, double age_s, const Matrix6& R_target_base) {
-    of_pose += block;
-    if (age_s == 0.0)
-      return;
-    const Matrix6 across = -age_s * block.H * R_target_base;
-    H.topRightCorner<6, 6>() += across;
-    H.bottomRightCorner<6, 6>() -= age_s * R_target_base.transpose() * across;
-    b.tail<6>() -= age_s * R_target_base.transpose() * block.b;
-  }
-  /// Eq. 10 in docs/estimator.md.
-  void complete(const Axes& axes, const Matrix6& R_target_base) {
-    H.topLeftCorner<6, 6>() = of_pose.H;
-    H.bottomLeftCorner<6, 6>() = H.topRightCorner<6, 6>().transpose();
-    b.head<6>() = of_pose.b;
-    Matrix6 solved = Matrix6::Zero(), claimed = Matrix6::Zero(); // square roots of the remaining share of information
-    const double independent = std::max(1.0, kIndependent * of_pose.weight);
-    for (int side = 0; side < 6; ++side) {
-      Vector6 axis = Vector6::Unit(side);
-      if (side < 3)
-        axis.head<3>() = Eigen::Vector3f(axes[static_cast<std::size_t>(side)].data()).cast<double>();
-      const double all = std::max(axis.dot(of_pose.H * axis), kNothing);
-      const double observed = std::clamp(of_pose.observed[side], kNothing, all);
-      const double certain =
-          std::max(kNothing, observed - square(kByChance_sigma * all) / independent / observed); // James-Stein
-      const double common = square(kCommonError_m * of_pose.sides[side]);
-      solved += observed / std::sqrt(all * (observed + common)) * axis * axis.transpose();
-      claimed += certain / std::sqrt(all * (certain + common)) * axis * axis.transpose();
-    }
-    const Matrix12 of_both = pose_and_twist(solved, R_target_base),
-                   certain_of_both = pose_and_twist(claimed, R_target_base);
-    information = certain_of_both * H * certain_of_both;
-    H = (of_both * of_both * H).eval();
-    b = (of_both * of_both * b).eval();
-    const double honest = honest_share(of_pose.error / std::max(of_pose.weight, 1.0));
-    information *= honest;
-    H *= honest;
-    b *= honest;
-  }
-};
 
 /// Returns the block that begins at `begin`; empty beyond the end.
 template <class T> std::span<const T> block_at(std::size_t begin, std::span<const T> all) {
