@@ -229,4 +229,11 @@ template <class Section> void fields(Section& section, Config& config) {
   section.key("metrics", config.metrics);
 }
 
+struct AnySection;
+/// Type with keys, which fields() visits, as opposed to a single value.
+template <class T>
+concept HasFields = requires(T& value, AnySection& section) {
+  fields(section, value);
+};
+
 } // namespace locus
