@@ -2,102 +2,21 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <concepts>
-#include <filesystem>
-#include <fstream>
-#include <initializer_list>
-#include <iterator>
 #include <optional>
-#include <sstream>
 #include <string>
 #include <string_view>
-#include <utility>
-
-#include <fmt/format.h>
-#include <unistd.h>
 
 #include "config/config_yaml.hpp"
 #include "core/base/pose.hpp"
 #include "daemon/figures.hpp"
+#include "daemon/metrics_text.hpp"
+#include "daemon/process_metrics.hpp"
 #include "drivers/net/datagram.hpp"
 
 namespace locus::daemon {
 namespace {
 
-/// Label values need no escaping: configured names consist of letters, digits, _ and -.
-using Labels = std::initializer_list<std::pair<std::string_view, std::string_view>>;
-
-std::string number(std::integral auto value) { return fmt::format("{}", value); }
-
-std::string number(double value) {
-  if (std::isnan(value))
-    return "NaN";
-  if (std::isinf(value))
-    return value > 0 ? "+Inf" : "-Inf";
-  return fmt::format("{}", value);
-}
-
-/// Builds the text of all metrics. The samples of a family follow its header; a family without samples is omitted.
-class MetricsText {
- public:
-  void counter(std::string_view name, std::string_view help) { begin(name, "counter", "_total", help); }
-  void gauge(std::string_view name, std::string_view help) { begin(name, "gauge", "", help); }
-  void info(std::string_view name, std::string_view help) { begin(name, "info", "_info", help); }
-  void state_set(std::string_view name, std::string_view help) { begin(name, "stateset", "", help); }
-  void histogram(std::string_view name, std::string_view help) { begin(name, "histogram", "", help); }
-
-  void add(Labels labels, auto value) { sample(suffix_, labels, "", "", number(value)); }
-  void add(auto value) { add({}, value); }
-  void add_info(Labels labels) { add(labels, 1); }
-  void add_state(Labels labels, std::string_view state, bool is_it) {
-    sample("", labels, name_, state, is_it ? "1" : "0");
-  }
-  void add_buckets(const LatencyHistogram& histogram) {
-    std::uint64_t count = 0;
-    for (std::size_t i = 0; i < histogram.counts.size(); ++i) {
-      count += histogram.counts[i];
-      const bool is_last = i == LatencyHistogram::kBounds_s.size();
-      sample("_bucket", {}, "le", is_last ? "+Inf" : number(LatencyHistogram::kBounds_s[i]), number(count));
-    }
-    sample("_sum", {}, "", "", number(histogram.sum_s));
-    sample("_count", {}, "", "", number(count));
-  }
-
-  std::string finish() { return std::move(text_) + "# EOF\n"; }
-
- private:
-  void begin(std::string_view name, std::string_view type, std::string_view suffix, std::string_view help) {
-    name_ = name;
-    suffix_ = suffix;
-    head_ = fmt::format("# TYPE {} {}\n", name, type);
-    for (const std::string_view unit : {"seconds", "bytes", "meters", "radians", "hertz", "ratio"})
-      if (type != "info" && name.ends_with(unit) && !name.ends_with("per_second"))
-        head_ += fmt::format("# UNIT {} {}\n", name, unit);
-    head_ += fmt::format("# HELP {} {}\n", name, help);
-  }
-
-  /// Appends a sample; `last` is an additional label unless it is empty.
-  void sample(std::string_view suffix, Labels labels, std::string_view last, std::string_view last_text,
-              const std::string& value) {
-    text_ += std::exchange(head_, {});
-    text_ += name_;
-    text_ += suffix;
-    std::string inside;
-    const auto append = [&](std::string_view label, std::string_view text) {
-      fmt::format_to(std::back_inserter(inside), "{}{}=\"{}\"", inside.empty() ? "" : ",", label, text);
-    };
-    for (const auto& [label, text] : labels)
-      append(label, text);
-    if (!last.empty())
-      append(last, last_text);
-    if (!inside.empty())
-      text_ += '{' + inside + '}';
-    text_ += ' ' + value + '\n';
-  }
-
-  std::string text_, head_;
-  std::string_view name_, suffix_;
-};
+using Labels = MetricsText::Labels;
 
 /// Adds a state set with the current state among all states of `E`.
 template <Named E> void add_states(MetricsText& text, Labels labels, std::string_view state) {
@@ -393,56 +312,6 @@ void add_outlets(MetricsText& text, const Figures::Live& live) {
   text.add(live.recording->dropped);
   text.counter("locusd_recording_inputs_unfit", "Samples that a recording cannot hold.");
   text.add(live.recording->unfit);
-}
-
-/// Returns the start of the process on the wall clock, from field 22 of /proc/self/stat. Computed once: a clock step
-/// does not change it.
-double start_time_s() {
-  static const double start_s = [] {
-    std::string stat;
-    std::getline(std::ifstream{"/proc/self/stat"}, stat);
-    stat.erase(0, stat.rfind(')') + 2); // the program name may contain spaces
-    constexpr int kStateToStart = 19;
-    std::istringstream fields{stat};
-    std::string skipped;
-    for (int i = 0; i < kStateToStart; ++i)
-      fields >> skipped;
-    double ticks = 0;
-    fields >> ticks;
-    const double age_s = to_seconds(read_clock(CLOCK_BOOTTIME)) - ticks / static_cast<double>(sysconf(_SC_CLK_TCK));
-    return to_seconds(read_clock(CLOCK_REALTIME)) - age_s;
-  }();
-  return start_s;
-}
-
-std::uint64_t resident_bytes() {
-  std::ifstream statm{"/proc/self/statm"};
-  std::uint64_t size = 0, resident = 0;
-  statm >> size >> resident;
-  return resident * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
-}
-
-/// Counts the open descriptors; empty if /proc cannot be read.
-std::optional<std::size_t> open_files() {
-  std::error_code error;
-  std::size_t count = 0;
-  for (std::filesystem::directory_iterator entry{"/proc/self/fd", error}, end; !error && entry != end;
-       entry.increment(error))
-    ++count;
-  return error || count == 0 ? std::nullopt : std::optional{count - 1}; // excluding the folder's own
-}
-
-/// Adds process metrics under the standard names of the Prometheus client libraries.
-void add_process(MetricsText& text) {
-  text.counter("process_cpu_seconds", "Processor time of all threads.");
-  text.add(to_seconds(read_clock(CLOCK_PROCESS_CPUTIME_ID)));
-  text.gauge("process_resident_memory_bytes", "Memory in use.");
-  text.add(resident_bytes());
-  text.gauge("process_open_fds", "Open file descriptors.");
-  if (const auto files = open_files())
-    text.add(*files);
-  text.gauge("process_start_time_seconds", "Start of the process, since the Unix epoch.");
-  text.add(start_time_s());
 }
 
 } // namespace
