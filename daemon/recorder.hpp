@@ -6,8 +6,6 @@
 #include <bitset>
 #include <cstddef>
 #include <cstdint>
-#include <cstdio>
-#include <deque>
 #include <filesystem>
 #include <memory>
 #include <mutex>
@@ -17,121 +15,15 @@
 #include <vector>
 
 #include "config/config.hpp"
-#include "core/base/expected.hpp"
 #include "core/base/stamp.hpp"
 #include "core/ingest/sweep.hpp"
+#include "daemon/capture_ring.hpp"
 #include "daemon/input.hpp"
+#include "daemon/piece_writer.hpp"
 #include "daemon/threads.hpp"
-#include "drivers/files/pcap_writer.hpp"
 #include "drivers/velodyne/model.hpp"
 
 namespace locus::daemon {
-
-/// Limits of a recording.
-struct RecordingBounds {
-  std::uint64_t max_bytes;   ///< size of the folder
-  Duration piece = kForEver; ///< longest duration of a piece, first to last input
-  Duration keep = kForEver;  ///< age beyond which ended pieces are removed, at the start of the next one
-
-  static constexpr Duration kForEver = std::chrono::hours{24 * 365 * 100};
-};
-
-/// Recordings on disk within a size limit: FOLDER/RUN/PIECE, each piece a capture folder.
-///
-/// A run is named by its consecutive number and the time of its first input, e.g. 000003_2026-11-22T08-12-05Z; its
-/// pieces are numbered. Before a new piece the oldest pieces of all runs are removed until it fits the limit and leaves
-/// the size of a piece free on the disk. Entries with other names are never touched, so a moved or renamed run is safe.
-/// One owner; calls may block on the disk.
-class CaptureRing {
- public:
-  /// Accesses the disk with the first piece only.
-  CaptureRing(std::filesystem::path folder, std::uint64_t max_bytes, Duration keep = RecordingBounds::kForEver);
-
-  /// Returns a certain obstacle to a piece, in one line for the user. Creates nothing.
-  [[nodiscard]] std::optional<std::string> obstacle() const;
-  /// Makes room, and a folder for the next piece. Fails with one line for the user.
-  Expected<std::filesystem::path, std::string> begin_piece(Stamp now);
-  /// Adds the current piece to the run as complete.
-  void end_piece();
-  /// Removes the current piece, which holds no usable data.
-  void discard_piece();
-
-  /// Returns the size limit of a piece, all files together.
-  [[nodiscard]] std::uint64_t piece_bytes() const;
-  /// Returns, in order, the pieces of the run that ended within the last `keep`.
-  [[nodiscard]] std::vector<std::filesystem::path> last_pieces(Duration keep) const;
-  /// Returns the size on disk without the current piece.
-  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
-  /// Returns the folder of the run; empty before the first piece.
-  [[nodiscard]] const std::filesystem::path& run() const { return run_; }
-
- private:
-  struct Piece {
-    std::filesystem::path folder;
-    std::uint64_t bytes;
-    Duration ended; ///< CLOCK_MONOTONIC; time of discovery for a piece of an earlier run
-  };
-
-  std::optional<std::string> scan_folder();
-  std::optional<std::string> make_room();
-  Expected<std::filesystem::path, std::string> make_piece(Stamp now);
-  std::optional<std::string> remove_oldest();
-
-  std::filesystem::path folder_;
-  std::uint64_t max_bytes_;
-  Duration keep_;
-  bool is_scanned_ = false;
-  std::deque<Piece> pieces_; ///< oldest first
-  std::uint64_t bytes_ = 0;  ///< total size of pieces_
-  int last_run_ = 0;
-  std::filesystem::path run_, piece_;
-  int last_piece_ = 0;
-};
-
-/// Returns the name of the sample file of each source in a capture folder, by index; empty for a second IMU, which the
-/// format does not support, and for other sources that are not recorded.
-std::vector<std::optional<std::string>> sample_files(const Config& config);
-
-/// Writes a capture folder: lidar.pcap, config.yaml, and the samples of each source with their arrivals. Numbers
-/// round-trip exactly. One owner; calls may block on the disk.
-class PieceWriter {
- public:
-  /// Opens the files in an empty folder. Fails with one line for the user.
-  static Expected<PieceWriter, std::string> open(const std::filesystem::path& folder, const Config& config);
-
-  void write(const Datagram& datagram) { pcap_.write(datagram); }
-  /// Writes a sample; false if the format cannot hold it: a time before 1951, or a zero quaternion.
-  bool write(const ImuInput& input);
-  bool write(const OdometryInput& input);
-
-  /// Flushes all files to the system, or to the disk. Returns one line for the user on failure.
-  std::optional<std::string> flush(bool to_disk);
-
-  /// Returns the size of all files so far.
-  [[nodiscard]] std::uint64_t bytes() const { return pcap_.bytes() + text_bytes_; }
-
- private:
-  struct Closer {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
-  struct TextFile {
-    std::filesystem::path path;
-    std::unique_ptr<std::FILE, Closer> file{};
-  };
-  struct SourceFiles {
-    TextFile samples, meta; ///< empty path: source is not recorded
-  };
-
-  PieceWriter(PcapWriter pcap, const std::filesystem::path& folder, const Config& config);
-  bool write(SourceId source, Stamp stamp, Stamp arrival, double covariance_scale, const std::string& line);
-  void append(TextFile& file, const std::string& text);
-
-  PcapWriter pcap_;
-  TextFile config_;
-  std::vector<SourceFiles> sources_; ///< by source index; opened with the first sample
-  std::uint64_t text_bytes_ = 0;
-  std::optional<std::string> problem_; ///< first failure of this piece
-};
 
 /// Records the input for locus-replay in a CaptureRing.
 ///

@@ -8,7 +8,7 @@
 
 #include "core/base/expected.hpp"
 #include "core/base/stamp.hpp"
-#include "daemon/recorder.hpp"
+#include "daemon/capture_ring.hpp"
 
 /// Data that survives a crash of the service, in a folder next to the control socket: the input of the last minute, and
 /// a mark with the run being recorded. Both are removed at a clean end. Only for the service that owns the control
