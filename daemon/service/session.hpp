@@ -23,6 +23,7 @@
 #include "daemon/service/log.hpp"
 #include "daemon/service/run_mark.hpp"
 #include "daemon/service/saved_state.hpp"
+#include "daemon/service/state_saver.hpp"
 
 namespace locus::daemon {
 

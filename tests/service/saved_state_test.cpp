@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/service/state_saver.hpp"
 #include "replay/replay_run.hpp"
 #include "support/errors.hpp"
 #include "support/patience.hpp"

@@ -8,7 +8,7 @@
 
 #include "config/config.hpp"
 #include "daemon/live_pipeline.hpp"
-#include "daemon/service/saved_state.hpp"
+#include "daemon/service/state_saver.hpp"
 #include "piece.hpp"
 #include "support/held_input.hpp"
 
