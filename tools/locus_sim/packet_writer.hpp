@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -75,5 +76,12 @@ std::unique_ptr<PacketWriter> velodyne_writer(const SyntheticLidarOptions& optio
 std::unique_ptr<PacketWriter> hesai_writer(const SyntheticLidarOptions& options);
 /// Writes single returns likewise. The sensor's clock starts some time before `start`.
 std::unique_ptr<PacketWriter> ouster_writer(const SyntheticLidarOptions& options, Stamp start);
+
+inline constexpr std::size_t kPositionPacketBytes = 512;
+inline constexpr std::uint16_t kPositionPort = 8308;
+
+/// Fills a Velodyne's position packet, of zeros or filled before. `shown`: reading of the sensor's clock, also in the
+/// sentence of the satellite receiver. `pps_locked`: there are a pulse per second and a valid fix. Any thread.
+void fill_position_packet(std::array<std::byte, kPositionPacketBytes>& packet, Stamp shown, bool pps_locked);
 
 } // namespace locus::sim

@@ -1,24 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "locus_sim/synthetic_lidar.hpp"
 
-#include <fmt/chrono.h>
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <numbers>
-#include <numeric>
 #include <span>
 #include <utility>
 
 #include "locus_sim/dice.hpp"
+#include "locus_sim/footprint.hpp"
 
 namespace locus::sim {
 namespace {
 
 constexpr double kTurn_rad = 2 * std::numbers::pi;
-constexpr double kRangeResolution_m = 1.0; // closer echoes merge into one
 constexpr int kDataPacketsPerPosition = 5;
 
 // A Gaussian beam is reduced to five rays that match its moments up to the fifth (Gauss-Hermite): the centre, and four
@@ -35,26 +30,6 @@ constexpr double kWhite = 100;   // Velodyne's scale: the brightest diffuse refl
 // Velodyne's data sheets: at 10 % reflectivity the range is about half.
 constexpr double kDark = 10, kReachOfDark = 0.5;
 
-// Position packet, VLP-16 user manual 63-9243, section 9.4.
-constexpr std::uint16_t kPositionPort = 8308;
-constexpr std::size_t kPositionTimeOffset = 198, kPpsOffset = 202, kNmeaOffset = 206;
-constexpr std::byte kPpsAbsent{0}, kPpsLocked{2};
-
-template <std::size_t Size>
-void put(std::array<std::byte, Size>& bytes, std::size_t offset, std::uint32_t value, std::size_t count) {
-  for (std::size_t i = 0; i < count; ++i)
-    bytes[offset + i] = static_cast<std::byte>(value >> (8 * i));
-}
-
-/// Formats GPRMC: recommended minimum of a satellite receiver, with the time and date of the last whole second.
-std::string gprmc(Stamp stamp, bool valid_fix) {
-  const std::time_t second = std::chrono::floor<std::chrono::seconds>(stamp).time_since_epoch().count();
-  const std::string body = fmt::format("GPRMC,{0:%H%M%S},{1},4801.0000,N,01131.0000,E,000.0,000.0,{0:%d%m%y},000.0,W",
-                                       fmt::gmtime(second), valid_fix ? 'A' : 'V');
-  const auto checksum = std::accumulate(body.begin(), body.end(), 0, [](int sum, char c) { return sum ^ c; });
-  return fmt::format("${}*{:02X}\r\n", body, checksum);
-}
-
 std::unique_ptr<PacketWriter> writer_for(const SyntheticLidarOptions& options, Stamp start) {
   if (is_ouster(options.model))
     return ouster_writer(options, start);
@@ -62,78 +37,6 @@ std::unique_ptr<PacketWriter> writer_for(const SyntheticLidarOptions& options, S
 }
 
 } // namespace
-
-/// Echoes of the rays of one beam: returns too close in range to be resolved merge into one echo at their
-/// energy-weighted mean (mixed pixels).
-class SyntheticLidar::Footprint {
- public:
-  void add(const std::optional<Sight>& sight, double weight) {
-    if (!sight)
-      return;
-    const Hit& hit = sight->hit;
-    const double light = weight * hit.reflectivity;
-    glimpses_[count_++] = {*sight, light, light * hit.cos_incidence / (hit.range_m * hit.range_m)};
-  }
-
-  /// Sorts the hits by range, nearest first, and merges unresolved ones.
-  void merge() {
-    std::sort(glimpses_.begin(), glimpses_.begin() + static_cast<std::ptrdiff_t>(count_),
-              [](const Glimpse& a, const Glimpse& b) { return a.sight.hit.range_m < b.sight.hit.range_m; });
-    std::size_t merged = 0;
-    for (std::size_t i = 0, end = 0; i < count_; i = end) {
-      const double from_m = glimpses_[i].sight.hit.range_m;
-      for (end = i; end < count_ && glimpses_[end].sight.hit.range_m < from_m + kRangeResolution_m;)
-        ++end;
-      glimpses_[merged++] = mixed(std::span(glimpses_).subspan(i, end - i));
-    }
-    count_ = merged;
-  }
-
-  [[nodiscard]] bool empty() const { return count_ == 0; }
-  [[nodiscard]] const Sight& last() const { return glimpses_[count_ - 1].sight; }
-  [[nodiscard]] const Sight& strongest() const { return strongest_of(count_); }
-  /// Returns the second strongest if the strongest is also the last, as the sensor does.
-  [[nodiscard]] const Sight& strongest_beside_last() const {
-    return strongest_of(std::max<std::size_t>(count_, 2) - 1);
-  }
-
- private:
-  struct Glimpse {
-    Sight sight;
-    double light;  ///< reflectivity times share of the beam
-    double energy; ///< received, in arbitrary units
-  };
-
-  [[nodiscard]] const Sight& strongest_of(std::size_t count) const {
-    return std::max_element(glimpses_.begin(), glimpses_.begin() + static_cast<std::ptrdiff_t>(count),
-                            [](const Glimpse& a, const Glimpse& b) { return a.energy < b.energy; })
-        ->sight;
-  }
-
-  /// Merges the parts of one echo, at the position of the brightest.
-  static Glimpse mixed(std::span<const Glimpse> parts) {
-    Glimpse all = *std::max_element(parts.begin(), parts.end(),
-                                    [](const Glimpse& a, const Glimpse& b) { return a.energy < b.energy; });
-    double light = 0, energy = 0, range = 0, slant = 0;
-    for (const Glimpse& part : parts) {
-      light += part.light;
-      energy += part.energy;
-      range += part.energy * part.sight.hit.range_m;
-      slant += part.energy * part.sight.hit.cos_incidence;
-    }
-    all.light = light;
-    all.energy = energy;
-    all.sight.hit.reflectivity = static_cast<std::uint8_t>(std::clamp(std::round(light), 1.0, 255.0));
-    if (energy > 0) {
-      all.sight.hit.range_m = range / energy;
-      all.sight.hit.cos_incidence = slant / energy;
-    }
-    return all;
-  }
-
-  std::array<Glimpse, 5> glimpses_;
-  std::size_t count_ = 0;
-};
 
 SyntheticLidar::SyntheticLidar(const Scene& scene, const Trajectory& trajectory, const SyntheticLidarOptions& options,
                                ObservedSpace* observed)
@@ -172,7 +75,7 @@ void SyntheticLidar::aim(const SyntheticLidarOptions& options) {
 Datagram SyntheticLidar::next() {
   if (options_.sends_position_packets && data_packets_until_position_ == 0) {
     data_packets_until_position_ = kDataPacketsPerPosition;
-    fill_position_packet();
+    fill_position_packet(position_, packet_begin_ + options_.clock_offset, options_.pps_locked);
     return datagram(position_, kPositionPort);
   }
   --data_packets_until_position_;
@@ -428,18 +331,6 @@ Stamp SyntheticLidar::true_time(Stamp own_time) const {
 double SyntheticLidar::rotor_azimuth_rad(Stamp stamp) const {
   const double turns = to_seconds(stamp - trajectory_.start()) * pattern_.rpm / 60 + pattern_.first_azimuth_deg / 360;
   return (turns - std::floor(turns)) * kTurn_rad;
-}
-
-std::uint32_t microseconds_past_hour(Stamp shown) {
-  return static_cast<std::uint32_t>(
-      std::chrono::floor<std::chrono::microseconds>(shown.time_since_epoch() % std::chrono::hours{1}).count());
-}
-
-void SyntheticLidar::fill_position_packet() {
-  put(position_, kPositionTimeOffset, microseconds_past_hour(packet_begin_ + options_.clock_offset), 4);
-  position_[kPpsOffset] = options_.pps_locked ? kPpsLocked : kPpsAbsent;
-  const std::string sentence = gprmc(packet_begin_ + options_.clock_offset, options_.pps_locked);
-  std::memcpy(position_.data() + kNmeaOffset, sentence.data(), sentence.size());
 }
 
 } // namespace locus::sim

@@ -20,8 +20,6 @@
 
 namespace locus::sim {
 
-inline constexpr std::size_t kPositionPacketBytes = 512;
-
 /// Offset of the right edge of the beam, which in dual return mode may hit another surface than its centre.
 inline constexpr double kHalfBeam_rad = 0.0015;
 
@@ -56,9 +54,6 @@ struct SyntheticLidarOptions {
   std::vector<Surface> own_parts{};    ///< of the robot, base frame
   std::uint64_t seed = 1;
 };
-
-/// Converts the reading of a Velodyne's clock; 0 <= result < 1 h.
-std::uint32_t microseconds_past_hour(Stamp shown);
 
 /// Lidar on a moving robot: generates the sensor's datagrams, firing by firing. Every ray starts at the laser's
 /// position at its own time, at the rotor's azimuth at that time. One owner.
@@ -122,7 +117,6 @@ class SyntheticLidar {
   bool is_lost(double strength);
   [[nodiscard]] Stamp true_time(Stamp own_time) const;
   [[nodiscard]] double rotor_azimuth_rad(Stamp stamp) const;
-  void fill_position_packet();
   [[nodiscard]] Datagram datagram(std::span<const std::byte> payload, std::uint16_t port);
   Stamp arrival();
 

@@ -1,7 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
 #include <array>
+#include <chrono>
 #include <cmath>
+#include <cstring>
+#include <ctime>
 #include <numbers>
+#include <numeric>
+#include <string>
 #include <utility>
 
 #include "drivers/velodyne/model.hpp"
@@ -10,6 +18,16 @@
 
 namespace locus::sim {
 namespace {
+
+// Position packet, VLP-16 user manual 63-9243, section 9.4.
+constexpr std::size_t kPositionTimeOffset = 198, kPpsOffset = 202, kNmeaOffset = 206;
+constexpr std::byte kPpsAbsent{0}, kPpsLocked{2};
+
+/// Converts the reading of the clock; 0 <= result < 1 h.
+std::uint32_t microseconds_past_hour(Stamp shown) {
+  return static_cast<std::uint32_t>(
+      std::chrono::floor<std::chrono::microseconds>(shown.time_since_epoch() % std::chrono::hours{1}).count());
+}
 
 FiringPattern pattern_of(const SyntheticLidarOptions& options, velodyne::Model model) {
   const velodyne::ModelSpec& spec = velodyne::spec(model);
@@ -81,10 +99,32 @@ class VelodyneWriter : public PacketWriter {
   std::array<std::byte, velodyne::kDataPacketBytes> data_{};
 };
 
+template <std::size_t Size>
+void put(std::array<std::byte, Size>& bytes, std::size_t offset, std::uint32_t value, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i)
+    bytes[offset + i] = static_cast<std::byte>(value >> (8 * i));
+}
+
+/// Formats GPRMC: recommended minimum of a satellite receiver, with the time and date of the last whole second.
+std::string gprmc(Stamp stamp, bool valid_fix) {
+  const std::time_t second = std::chrono::floor<std::chrono::seconds>(stamp).time_since_epoch().count();
+  const std::string body = fmt::format("GPRMC,{0:%H%M%S},{1},4801.0000,N,01131.0000,E,000.0,000.0,{0:%d%m%y},000.0,W",
+                                       fmt::gmtime(second), valid_fix ? 'A' : 'V');
+  const auto checksum = std::accumulate(body.begin(), body.end(), 0, [](int sum, char c) { return sum ^ c; });
+  return fmt::format("${}*{:02X}\r\n", body, checksum);
+}
+
 } // namespace
 
 std::unique_ptr<PacketWriter> velodyne_writer(const SyntheticLidarOptions& options) {
   return std::make_unique<VelodyneWriter>(options, std::get<velodyne::Model>(options.model));
+}
+
+void fill_position_packet(std::array<std::byte, kPositionPacketBytes>& packet, Stamp shown, bool pps_locked) {
+  put(packet, kPositionTimeOffset, microseconds_past_hour(shown), 4);
+  packet[kPpsOffset] = pps_locked ? kPpsLocked : kPpsAbsent;
+  const std::string sentence = gprmc(shown, pps_locked);
+  std::memcpy(packet.data() + kNmeaOffset, sentence.data(), sentence.size());
 }
 
 } // namespace locus::sim
