@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -11,6 +9,7 @@
 #include "locus_sim/hit.hpp"
 #include "locus_sim/mirrors.hpp"
 #include "locus_sim/passer.hpp"
+#include "locus_sim/scene_tree.hpp"
 #include "locus_sim/shapes.hpp"
 #include "locus_sim/steam.hpp"
 
@@ -51,13 +50,6 @@ class Scene {
   [[nodiscard]] const Steam& steam() const { return steam_; }
 
  private:
-  /// Four children, one per lane. Candidates are found in single precision; hits are computed in double precision.
-  struct Node {
-    using Lanes = Eigen::Array4f;
-    std::array<Lanes, 3> min_m, max_m;  ///< of x, y and z
-    std::array<std::uint32_t, 4> child; ///< node, or surface with kSurface set
-  };
-  class TreeMaker;
   struct Met {
     double range_m;
     const Surface* surface = nullptr;
@@ -74,7 +66,7 @@ class Scene {
   void cast_at_movers(const Ray& ray, Stamp stamp, Met& nearest) const;
 
   std::vector<Surface> surfaces_; ///< in tree order
-  std::vector<Node> nodes_;       ///< root last
+  std::vector<TreeNode> nodes_;   ///< root last
   std::vector<Mover> movers_;
   std::vector<Bounds> mover_bounds_;
   std::vector<Passer> passers_;
