@@ -32,6 +32,11 @@ class SurfaceMap {
   /// Returns whether a point can be looked up: finite, and within the range of voxel indices.
   [[nodiscard]] bool reaches(const Eigen::Vector3d& point_m) const { return fine_.reaches(point_m); }
 
+  /// Returns whether the fine voxel that contains a point holds points of the map.
+  [[nodiscard]] bool is_occupied(const Eigen::Vector3d& point_m) const {
+    return reaches(point_m) && fine_.find(fine_.index_of(point_m)) != nullptr;
+  }
+
   /// Returns the coarse voxel that contains a fine one.
   [[nodiscard]] static VoxelIndex coarse_of(VoxelIndex fine) {
     const auto cell = [](std::int32_t i) {

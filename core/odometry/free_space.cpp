@@ -13,11 +13,12 @@ namespace {
 /// Longest validity of free space: while a robot stands, anything may move into it.
 constexpr Duration kRecent = std::chrono::seconds{10};
 
-/// Margin by which a point must be nearer than the returns behind it: a fine voxel of the map, and the effect of an
-/// error of direction on the range.
-constexpr float kBefore_m = 0.5F, kBeforeShare = 0.05F;
+/// Margin by which a point must be nearer, or farther, than the returns in its direction: a fine voxel of the map, and
+/// the effect of an error of direction on the range.
+constexpr float kApart_m = 0.5F, kApartShare = 0.05F;
+constexpr float apart_m(float range_m) { return kApart_m + kApartShare * range_m; }
 
-/// Least number of returns in a direction and its eight neighbours, all of them farther away, for free space.
+/// Least number of returns in a direction and its eight neighbours, all of them farther away or all nearer.
 constexpr int kEnough = 3;
 
 } // namespace
@@ -34,13 +35,14 @@ void FreeSpace::expect(const Sweep& sweep) {
     lidar_of_.push_back(lidar_of(point));
 }
 
-std::span<const SurfacePoint> FreeSpace::leave_out_moving(std::span<const SurfacePoint> scan_base,
-                                                          const Pose& T_odom_base) {
+std::span<const SurfacePoint> FreeSpace::leave_out_contradicting(std::span<const SurfacePoint> scan_base,
+                                                                 const Pose& T_odom_base, const SurfaceMap& map) {
   const Eigen::Matrix3f R_odom_base = T_odom_base.R().cast<float>();
   const Eigen::Vector3f t_odom_base = T_odom_base.translation.cast<float>();
   standing_.clear();
   std::ranges::copy_if(scan_base, std::back_inserter(standing_), [&](const SurfacePoint& point) {
-    return !is_free(R_odom_base * point.position_m + t_odom_base);
+    const Eigen::Vector3f point_odom_m = R_odom_base * point.position_m + t_odom_base;
+    return !is_free(point_odom_m) && (!is_hidden(point_odom_m) || map.is_occupied(point_odom_m.cast<double>()));
   });
   add_keyframe(scan_base, T_odom_base);
   return standing_;
@@ -48,29 +50,60 @@ std::span<const SurfacePoint> FreeSpace::leave_out_moving(std::span<const Surfac
 
 bool FreeSpace::is_free(const Eigen::Vector3f& point_odom_m) const {
   for (std::size_t i = 0; i < std::min(keyframes_, kKeyframes); ++i)
-    if (std::chrono::abs(stamp_ - last_[i].stamp) < kRecent &&
+    if (is_recent(last_[i]) &&
         std::ranges::any_of(last_[i].views, [&](const View& view) { return sees_through(view, point_odom_m); }))
       return true;
   return false;
 }
 
+/// Tells whether the surfaces that the last keyframe saw hide a point from all of its lidars that saw any there.
+bool FreeSpace::is_hidden(const Eigen::Vector3f& point_odom_m) const {
+  if (keyframes_ == 0)
+    return false;
+  const Keyframe& last = last_[(keyframes_ - 1) % kKeyframes];
+  bool hidden = false;
+  for (const View& view : last.views) {
+    const std::optional<int> nearer = count_around(view, point_odom_m, [](const Returns& returns, float range_m) {
+      return returns.farthest_m <= range_m - apart_m(range_m);
+    });
+    if (!nearer)
+      return false;
+    hidden = hidden || *nearer >= kEnough;
+  }
+  return hidden && is_recent(last);
+}
+
+bool FreeSpace::is_recent(const Keyframe& keyframe) const {
+  return std::chrono::abs(stamp_ - keyframe.stamp) < kRecent;
+}
+
 bool FreeSpace::sees_through(const View& view, const Eigen::Vector3f& point_odom_m) {
+  const auto is_farther = [](const Returns& returns, float range_m) {
+    return returns.nearest_m >= range_m + apart_m(range_m);
+  };
+  return count_around(view, point_odom_m, is_farther).value_or(0) >= kEnough;
+}
+
+/// Returns how many of the cells in the direction of a point and around it have returns, or nothing if
+/// `holds(returns, range of the point)` is false for one of them.
+template <class Condition>
+std::optional<int> FreeSpace::count_around(const View& view, const Eigen::Vector3f& point_odom_m,
+                                           const Condition& holds) {
   const Eigen::Vector3f direction = view.R_view_odom * (point_odom_m - view.lidar_odom_m);
   const float range_m = direction.norm();
-  const float behind_m = range_m + kBefore_m + kBeforeShare * range_m;
   const Cell at = cell_of(direction, range_m);
   int seen = 0;
   for (int row = std::max(at.row - 1, 0); row <= std::min(at.row + 1, kRows - 1); ++row)
     for (int side = -1; side <= 1; ++side) {
       const int column = (at.column + side + kColumns) % kColumns;
-      const float nearest_m = view.nearest_m[static_cast<std::size_t>(row * kColumns + column)];
-      if (nearest_m == 0.0F)
+      const Returns& returns = view.returns[static_cast<std::size_t>(row * kColumns + column)];
+      if (returns.farthest_m == 0.0F)
         continue;
-      if (nearest_m < behind_m)
-        return false;
+      if (!holds(returns, range_m))
+        return std::nullopt;
       ++seen;
     }
-  return seen >= kEnough;
+  return seen;
 }
 
 /// Returns the cell without computing angles: columns divide a diamond around the origin instead of a circle, rows the
@@ -92,7 +125,7 @@ void FreeSpace::add_keyframe(std::span<const SurfacePoint> scan_base, const Pose
     View& view = keyframe.views[i];
     view.lidar_odom_m = (T_odom_base * lidars_.base_m[i].cast<double>()).cast<float>();
     view.R_view_odom = T_odom_base.R().transpose().cast<float>();
-    view.nearest_m.fill(0.0F);
+    view.returns.fill({});
   }
   for (std::size_t i = 0; i < scan_base.size(); ++i) {
     const std::size_t lidar = lidar_of_[i];
@@ -101,8 +134,9 @@ void FreeSpace::add_keyframe(std::span<const SurfacePoint> scan_base, const Pose
     const Eigen::Vector3f direction = scan_base[i].position_m - lidars_.base_m[lidar];
     const float range_m = direction.norm();
     const Cell at = cell_of(direction, range_m);
-    float& nearest_m = keyframe.views[lidar].nearest_m[static_cast<std::size_t>(at.row * kColumns + at.column)];
-    nearest_m = nearest_m == 0.0F ? range_m : std::min(nearest_m, range_m);
+    Returns& returns = keyframe.views[lidar].returns[static_cast<std::size_t>(at.row * kColumns + at.column)];
+    returns.nearest_m = std::min(returns.nearest_m, range_m);
+    returns.farthest_m = std::max(returns.farthest_m, range_m);
   }
 }
 

@@ -129,7 +129,7 @@ void Odometry::prepare_next() {
   if (!keyframe_observability_)
     return;
   const StageScope scope(clock_, Stage::map);
-  const double fresh = map_.insert(free_space_.leave_out_moving(scan_, filter_.pose()), filter_.pose());
+  const double fresh = map_.insert(free_space_.leave_out_contradicting(scan_, filter_.pose(), map_), filter_.pose());
   const Matrix6 share = share_of_map(fresh, *keyframe_observability_);
   filter_.transfer_error_to_map(share);
   for (std::optional<Rival>& rival : rivals_)

@@ -117,7 +117,7 @@ void Odometry::find_start(const Sweep& sweep, const Gicp::StopRequested& stop) {
   free_space_.clear(); // the first sweep was not de-skewed
   if (start || run_before_) {
     free_space_.expect(first);
-    map_.insert(free_space_.leave_out_moving(scan_, filter_.pose()), filter_.pose());
+    map_.insert(free_space_.leave_out_contradicting(scan_, filter_.pose(), map_), filter_.pose());
   }
   run_before_.reset();
 }

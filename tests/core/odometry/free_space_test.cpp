@@ -86,7 +86,7 @@ class FreeSpaceTest : public ::testing::Test {
       }
     space_.expect(sweep);
     Points left;
-    for (const SurfacePoint& point : space_.leave_out_moving(scan_base, T_odom_base))
+    for (const SurfacePoint& point : space_.leave_out_contradicting(scan_base, T_odom_base, map_))
       left.push_back((T_odom_base * point.position_m.cast<double>()).cast<float>());
     return left;
   }
@@ -97,7 +97,16 @@ class FreeSpaceTest : public ::testing::Test {
     return seen_behind(room_, vehicle(x_m), (T_odom_base * kLidar_base_m.cast<double>()).cast<float>());
   }
 
+  /// Inserts points (odom frame) into the map.
+  void map(const Points& points_odom) {
+    std::vector<SurfacePoint> points;
+    for (const Eigen::Vector3f& point : points_odom)
+      points.push_back({point, Eigen::Vector3f::Zero()});
+    map_.insert(points, {});
+  }
+
   const Points room_ = wall(10.0F);
+  SurfaceMap map_{20'000'000};
   FreeSpace space_;
 };
 
@@ -132,10 +141,38 @@ TEST_F(FreeSpaceTest, ObjectThatStaysIsInsertedFiveKeyframesLater) {
   EXPECT_EQ(take(6, {}, seen).size(), seen.size());
 }
 
-TEST_F(FreeSpaceTest, DisoccludedSurfaceRemains) {
+TEST_F(FreeSpaceTest, SurfaceBehindTheLastReturnsIsInsertedOneKeyframeLater) {
+  take(0, {}, room_);
+  const Points seen = wall(12.0F);
+  EXPECT_TRUE(take(1, {}, seen).empty());
+  EXPECT_EQ(take(2, {}, seen).size(), seen.size());
+}
+
+TEST_F(FreeSpaceTest, DisoccludedSurfaceOfTheMapRemains) {
+  map(both(room_, vehicle(7.0F)));
   take(0, {}, around_vehicle(4.0F, {}));
   const Points farther = both(room_, vehicle(7.0F)); // the vehicle's position before it was at 4 m
   EXPECT_EQ(take(1, {}, farther).size(), farther.size());
+}
+
+TEST_F(FreeSpaceTest, SurfaceSeenBehindAPorousOneRemains) {
+  Points grass;
+  const Points near = wall(4.0F);
+  for (std::size_t i = 0; i < near.size(); i += 2)
+    grass.push_back(near[i]);
+  take(0, {}, both(grass, room_));
+  EXPECT_EQ(take(1, {}, room_).size(), room_.size());
+}
+
+TEST_F(FreeSpaceTest, SurfaceThatAnotherLidarSawRemains) {
+  take_of(2, 0, {}, {{around_vehicle(4.0F, {}), 0}, {room_, 1}});
+  EXPECT_EQ(take_of(2, 1, {}, {{room_, 0}, {{}, 1}}).size(), room_.size());
+}
+
+TEST_F(FreeSpaceTest, TenSecondOldSurfaceHidesNothing) {
+  take(0, {}, room_);
+  const Points seen = wall(12.0F);
+  EXPECT_EQ(take(10, {}, seen).size(), seen.size());
 }
 
 TEST_F(FreeSpaceTest, UnobservedSpaceIsNotFree) {
