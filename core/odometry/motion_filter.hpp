@@ -85,6 +85,11 @@ class MotionFilter {
   /// of the innovation, unless `slip_explained`.
   [[nodiscard]] Innovation innovation(SourceId id, const SensedTwist& sensed, bool slip_explained = false) const;
 
+  /// Returns how much a source contradicts the yaw rate: its squared Mahalanobis distance. A source is late by a share
+  /// of the change of the rate since the last sweep. Gravity shows the other rates, of which odometries on legs have
+  /// errors in common. Call after update().
+  [[nodiscard]] double contradiction(SourceId id, const SensedTwist& sensed) const;
+
   /// Returns the prior odds, as twice their logarithm, that no slip begins in this sweep. Call after predict().
   [[nodiscard]] double odds_against_slip() const;
 
@@ -180,7 +185,7 @@ class MotionFilter {
   std::size_t count_; ///< number of sources
   int states_ = JointCovariance::kCommonStates;
   Pose T_odom_start_, T_odom_base_;
-  Vector6 twist_base_ = Vector6::Zero();
+  Vector6 twist_base_ = Vector6::Zero(), last_twist_base_ = Vector6::Zero(); ///< of this sweep and of the last one
   State x_; ///< states other than pose and twist; zero at the entries of those
   JointCovariance P_;
   double elapsed_s_ = 0.0; ///< time between the ends of the last two sweeps

@@ -162,4 +162,10 @@ Innovation MotionFilter::innovation(SourceId id, const SensedTwist& sensed, bool
   return found;
 }
 
+double MotionFilter::contradiction(SourceId id, const SensedTwist& sensed) const {
+  const Innovation found = innovation(id, sensed, true);
+  const double late = kLateOdometry_s / elapsed_s_ * (twist_base_ - last_twist_base_)[kYawRate];
+  return square(found.value[kYawRate]) / (found.variance[kYawRate] + square(late));
+}
+
 } // namespace locus

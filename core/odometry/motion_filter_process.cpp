@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <utility>
 
 #include "core/odometry/motion_filter.hpp"
 #include "core/odometry/motion_filter_states.hpp"
@@ -52,7 +53,7 @@ void MotionFilter::predict(double elapsed_s, double period_s, const std::optiona
     age(source, elapsed_s);
     source.used = false;
   }
-  twist_base_ = step.mean;
+  last_twist_base_ = std::exchange(twist_base_, step.mean);
   predicted_variance_ = P_.variances(kTwist);
   elapsed_s_ = elapsed_s;
 }

@@ -102,6 +102,8 @@ class Odometry {
     bool accepted = false; ///< the registration is accepted
     MotionFilter filter;   ///< before the update with lidar
     Registration scan_to_scan, fit;
+
+    [[nodiscard]] MotionFilter updated() const;
   };
 
   /// A hypothesis that is less likely than the best one, and not excluded yet.
@@ -165,7 +167,9 @@ class Odometry {
   [[nodiscard]] std::bitset<kMaxSources> repeating_sources(const Sweep& sweep) const;
   [[nodiscard]] std::optional<double> odds_against_stuck(std::bitset<kMaxSources> repeating) const;
   [[nodiscard]] double odds_of_sources(const Sweep& sweep, std::bitset<kMaxSources> without) const;
-  [[nodiscard]] double prior_odds(const Sweep& sweep, const Hypothesis& hypothesis) const;
+  [[nodiscard]] double contradictions(const Sweep& sweep, const Hypothesis& hypothesis,
+                                      const MotionFilter& after) const;
+  [[nodiscard]] double prior_odds(const Sweep& sweep, const Hypothesis& hypothesis, const MotionFilter& after) const;
   [[nodiscard]] Rival against(const Hypothesis& best, const Sweep& sweep, Hypothesis other) const;
   [[nodiscard]] bool may_slip(const Sweep& sweep, const SourceChoice& choice) const;
   void continue_rivals(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop);

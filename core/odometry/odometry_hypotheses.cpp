@@ -49,6 +49,13 @@ bool may_rest(const MotionFilter& prediction) {
 
 } // namespace
 
+/// Returns the filter after the update with lidar.
+MotionFilter Odometry::Hypothesis::updated() const {
+  MotionFilter after = filter;
+  after.update(fit.T_target_source, fit.twist_base, fit.information);
+  return after;
+}
+
 Odometry::Hypothesis Odometry::attempt(const Sweep& sweep, const Assumption& assumption, const MotionFilter& last,
                                        const Gicp::StopRequested& stop) {
   Hypothesis hypothesis = assume(sweep, assumption, last);
@@ -136,7 +143,8 @@ std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Contes
   if (!is_unusual() || stop() || !(suspects[0] || suspects[1]) || (!observes_forward && best.choice.translation))
     return std::nullopt;
   Rival free = against(best, sweep, attempt(sweep, {.without = kAllSources}, filter_, stop));
-  const double fits_better = free.lead() + prior_odds(sweep, best) - prior_odds(sweep, free.hypothesis);
+  const double fits_better = free.lead() + prior_odds(sweep, best, best.updated()) -
+                             prior_odds(sweep, free.hypothesis, free.hypothesis.updated());
   std::optional<Registration> too_unlikely;
   if (free.lead() <= 0.0 && fits_better > 0.0)
     too_unlikely = free.hypothesis.fit;
@@ -206,8 +214,7 @@ bool Odometry::is_likelier(const Registration& at_rest, const Hypothesis& moving
 /// Returns a standstill if the robot may stand and it is likelier than the motion.
 std::optional<Odometry::Hypothesis> Odometry::consider_rest(const Sweep& sweep, const Hypothesis& moving,
                                                             const Gicp::StopRequested& stop) {
-  MotionFilter after = moving.filter;
-  after.update(moving.fit.T_target_source, moving.fit.twist_base, moving.fit.information);
+  const MotionFilter after = moving.updated();
   const Vector6 sigma_after = after.covariance().diagonal().tail<6>().cwiseSqrt();
   const bool slow = (moving.fit.twist_base.array().abs() < kSlow.array()).all() &&
                     (sigma_after.array() < kSlowDoubt * kSlow.array()).all(); // standstill requires an observed twist
@@ -225,15 +232,22 @@ std::optional<Odometry::Hypothesis> Odometry::consider_rest(const Sweep& sweep, 
   return rest;
 }
 
-/// Returns a hypothesis with all odometries that repeat their pose: what a robot without lidar knows.
+/// Returns what a robot without lidar knows: a hypothesis with all odometries that repeat their pose, and without the
+/// source of the rotation if the others outvote it.
 Odometry::Hypothesis Odometry::dead_reckoned(const Sweep& sweep, const Hypothesis& hypothesis) const {
+  const auto reckon = [&](std::bitset<kMaxSources> without) {
+    Hypothesis reckoned = assume(sweep, {.without = without}, filter_);
+    reckoned.scan_to_scan = hypothesis.scan_to_scan;
+    reckoned.fit = hypothesis.fit;
+    return reckoned;
+  };
   const std::bitset<kMaxSources> repeating = repeating_sources(sweep);
-  if ((hypothesis.without & repeating).none())
-    return hypothesis;
-  Hypothesis all = assume(sweep, {.without = hypothesis.without & ~repeating}, filter_);
-  all.scan_to_scan = hypothesis.scan_to_scan;
-  all.fit = hypothesis.fit;
-  return all;
+  Hypothesis all = (hypothesis.without & repeating).none() ? hypothesis : reckon(hypothesis.without & ~repeating);
+  if (!all.choice.rotation || contradictions(sweep, all, all.filter) <= kSourceIsRight) // no majority
+    return all;
+  std::bitset<kMaxSources> without = all.without;
+  Hypothesis outvoting = reckon(without.set(index_of(*all.choice.rotation)));
+  return prior_odds(sweep, outvoting, outvoting.filter) > prior_odds(sweep, all, all.filter) ? outvoting : all;
 }
 
 /// Returns the likeliest hypothesis for a sweep. The next ones stay as rivals, until later sweeps exclude them.
@@ -264,7 +278,7 @@ Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopReques
   for (std::optional<Rival>& rival : rivals_)
     if (rival) {
       Hypothesis& other = rival->hypothesis;
-      other.filter.update(other.fit.T_target_source, other.fit.twist_base, other.fit.information);
+      other.filter = other.updated();
       other.filter.learn();
     }
   return std::move(best);
@@ -272,8 +286,7 @@ Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopReques
 
 /// Returns the source that contradicts all others most, if any: one whose innovation is less likely than its fault.
 std::optional<Odometry::Contradiction> Odometry::worst_source(const Sweep& sweep, const Hypothesis& hypothesis) const {
-  MotionFilter after = hypothesis.filter;
-  after.update(hypothesis.fit.T_target_source, hypothesis.fit.twist_base, hypothesis.fit.information);
+  const MotionFilter after = hypothesis.updated();
   std::optional<Contradiction> worst;
   for (const auto& source : {hypothesis.choice.rotation, hypothesis.choice.translation}) {
     if (!source)

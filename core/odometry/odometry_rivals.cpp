@@ -64,19 +64,33 @@ double Odometry::odds_of_sources(const Sweep& sweep, std::bitset<kMaxSources> wi
   return kSourceIsRight * static_cast<double>(in_use.count());
 }
 
-/// O of eq. 13 in docs/estimator.md. Returns the prior odds of a hypothesis. A fault that continues is no less likely
-/// than none.
-double Odometry::prior_odds(const Sweep& sweep, const Hypothesis& hypothesis) const {
+/// Returns the odds, as twice their logarithm, against the sources that a hypothesis neither excludes nor needs for the
+/// rotation: each measures it, too, and is right or, against its odds, wrong. Compares yaw rates only: gravity shows
+/// the others, of which odometries on legs have errors in common. `after`: filter of the hypothesis.
+double Odometry::contradictions(const Sweep& sweep, const Hypothesis& hypothesis, const MotionFilter& after) const {
+  double odds = 0.0;
+  for (std::size_t i = 0; i < sources_.size(); ++i) {
+    const SourceId source{i};
+    if (hypothesis.without[i] || hypothesis.choice.rotation == source || !steps_.is_usable(sweep, source))
+      continue;
+    odds += std::min(kSourceIsRight, after.contradiction(source, *steps_.twist_base(sweep, source)));
+  }
+  return odds;
+}
+
+/// O of eq. 13 in docs/estimator.md. Returns the prior odds of a hypothesis, less the contradictions of the sources
+/// that it does not use. A fault that continues is no less likely than none. `after`: filter of the hypothesis.
+double Odometry::prior_odds(const Sweep& sweep, const Hypothesis& hypothesis, const MotionFilter& after) const {
   return odds_of_sources(sweep, hypothesis.continues ? repeating_sources(sweep) : hypothesis.without) -
-         (hypothesis.slips ? hypothesis.filter.odds_against_slip() : 0.0) -
+         contradictions(sweep, hypothesis, after) - (hypothesis.slips ? hypothesis.filter.odds_against_slip() : 0.0) -
          (hypothesis.turn_radps != 0.0 ? kKeepsTurning : 0.0);
 }
 
 /// Eq. 13 in docs/estimator.md. Compares a hypothesis with the best one: by the likelihood of the points, of the
 /// motion, and the prior odds.
 Odometry::Rival Odometry::against(const Hypothesis& best, const Sweep& sweep, Hypothesis other) const {
-  const double odds = best.filter.surprise(best.fit) - other.filter.surprise(other.fit) + prior_odds(sweep, other) -
-                      prior_odds(sweep, best);
+  const double odds = best.filter.surprise(best.fit) - other.filter.surprise(other.fit) +
+                      prior_odds(sweep, other, other.updated()) - prior_odds(sweep, best, best.updated());
   const ObjectEvidence objects = compare(other.fit, best.fit);
   return {std::move(other), odds, objects};
 }

@@ -57,6 +57,19 @@ TEST(JumpingGyro, OnLegsInAFieldIsExcluded) {
   EXPECT_LT(ape_mean_m(replay), 0.02);
 }
 
+/// Without lidar, legs and camera outvote the gyro.
+TEST(JumpingGyro, OnLegsWithoutLidarIsOutvoted) {
+  const SimulatedDrive drive("tunnel", "spot", 30, {}, 3, "real");
+  std::vector<std::string> faults{"--fail", "top:lost@10-25"};
+  const double sound_m = ape_mean_m(drive.replay(faults));
+  faults.emplace_back("--fail");
+  for (const char* jump : {"imu:jump=2@15-16", "imu:jump=-2@18.05-19"}) {
+    faults.emplace_back(jump);
+    EXPECT_LT(ape_mean_m(drive.replay(faults)), 1.2 * sound_m) << jump;
+    faults.pop_back();
+  }
+}
+
 TEST(JumpingGyro, WithoutWheelsIsExcluded) {
   const SimulatedDrive& drive = street();
   for (const double from_s : {8.0, 8.05}) {

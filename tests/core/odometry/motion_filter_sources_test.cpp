@@ -427,5 +427,31 @@ TEST(MotionFilter, WheelErrorOfOneMetrePerSecondIsDetected) {
     }
 }
 
+/// Contradiction of wheels that measure a share of the turn of 1 rad/s that the gyro sees begin within a sweep, and a
+/// roll rate.
+double contradiction_of(double share, double roll_radps) {
+  constexpr double kElapsed_s = 0.1, kTurn_radps = 1.0;
+  GaussianRobot robot(straight(1.0), {}, 1);
+  MotionFilter filter = begun_with(robot, straight(1.0));
+  sweep_for(20.0, filter, robot, kElapsed_s, {.lidar = usual_lidar(kElapsed_s)});
+  robot.move(kElapsed_s);
+  filter.predict(kElapsed_s, kElapsed_s, std::nullopt, kAll);
+  Vector6 turn = robot.twist();
+  turn[kYaw] += kTurn_radps;
+  filter.measure(kGyroSource, turn, kRotation);
+  filter.move();
+  turn[kYaw] += (share - 1.0) * kTurn_radps;
+  turn[kYaw - 2] += roll_radps;
+  return filter.contradiction(kWheelSource, turn);
+}
+
+TEST(MotionFilter, LateSourceDoesNotContradictATurnThatBegins) {
+  EXPECT_LT(contradiction_of(1.0, 0.0), 1.0);
+  EXPECT_LT(contradiction_of(0.8, 0.0), 1.5) << "20 ms late";
+  EXPECT_GT(contradiction_of(0.0, 0.0), 13.8) << "as unlikely as a fault";
+}
+
+TEST(MotionFilter, RollRateIsNoContradiction) { EXPECT_LT(contradiction_of(1.0, 1.0), 1.0); }
+
 } // namespace
 } // namespace locus::test
