@@ -254,8 +254,7 @@ Odometry::Hypothesis Odometry::dead_reckoned(const Sweep& sweep, const Hypothesi
 Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopRequested& stop) {
   const std::bitset<kMaxSources> repeating = repeating_sources(sweep);
   Contest contest{attempt(sweep, {.without = repeating}, filter_, stop), {}};
-  if (sweep.points.size() >= kMinPoints)
-    continue_rivals(sweep, contest, stop);
+  continue_rivals(sweep, contest, stop);
   Hypothesis& best = contest.best;
   gravity_.observe(filter_.pose().rotation.conjugate() * best.filter.pose().rotation, sweep);
   flat_ground_.observe(sweep.end, gravity_.up_base());

@@ -95,10 +95,10 @@ Odometry::Rival Odometry::against(const Hypothesis& best, const Sweep& sweep, Hy
   return {std::move(other), odds, objects};
 }
 
-/// Continues the rivals of the last sweep. They differ in the forward motion most; where lidar does not observe it,
-/// none is continued.
+/// Continues the rivals of the last sweep. They differ in the forward motion most; where lidar does not observe it, or
+/// is blind, none is continued.
 void Odometry::continue_rivals(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop) {
-  if (observed_axes_.forward())
+  if (observed_axes_.forward() && sweep.points.size() >= kMinPoints)
     for (std::optional<Rival>& before : rivals_)
       if (before && !stop())
         continue_rival(sweep, *before, contest, stop);

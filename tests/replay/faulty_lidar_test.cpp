@@ -80,6 +80,13 @@ TEST(PassingVehicle, DoesNotDragTheEstimateAlong) {
   }
 }
 
+/// The drive has a rival hypothesis when lidar is lost. Meanwhile the robot walks five metres and turns round.
+TEST(FaultyLidar, LostForTwentySecondsContinuesFromTheOdometry) {
+  const SimulatedDrive drive("stairs", "spot", 60, {}, 99601, "real");
+  const Replay replay = drive.replay({"--fail", "top:lost@20-40", "--fail", "imu:lost@20-40"});
+  EXPECT_LT(replay.summary()["ape_m"]["max"], 1.0);
+}
+
 TEST(FaultyLidar, DustDoesNotDegradeTheEstimate) {
   const SimulatedDrive drive("urban", "husky", 30, {"--dust", "0.1"});
   const Replay replay = drive.replay();
